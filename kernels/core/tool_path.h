@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "kernels/core/canonical_motion.h"
+#include "kernels/core/pose.h"
+
+namespace smoothpost {
+
+/// Tool tip point (mm) and unit tool axis (from tip to holder), both in the workpiece frame W.
+struct CutterLocation {
+  Vec3 tip = Vec3::Zero();
+  Vec3 axis = Vec3::UnitZ();
+};
+
+/// How the cutter location moves between two path points, as the input's controller would do it.
+enum class PathInterpolation : std::uint8_t {
+  great_circle,   ///< tip on the line or arc, axis on the great circle (CSV, direction vectors)
+  rotary_linear,  ///< tip on the line or arc, the input machine's rotary joints linear (TCP mode)
+  joint_linear    ///< every joint of the input machine linear (no TCP mode; arcs in joint space)
+};
+
+/// The pose at the end of one motion, where it came from, and how it is to be reached.
+struct PathPoint {
+  CutterLocation location;
+  MotionKind kind = MotionKind::rapid;  ///< of the segment that ends here; the first point has none
+  PathInterpolation interpolation = PathInterpolation::great_circle;
+  bool is_arc = false;
+  bool beam = false;  ///< beam on during the segment that ends here
+  std::uint32_t line = 0;
+  double duration = 0.0;  ///< s at the programmed feed, 0 for a rapid
+  AxisWords words{};      ///< input axis words at this point (rotary_linear, joint_linear)
+  double tool_length = 0.0;       ///< mm between the controlled point of `words` and the tip
+  std::int32_t arc = -1;          ///< index into ToolPath::arcs when is_arc
+};
+
+/// A process event, dwell or comment that happens when the path has reached `point`
+/// (0: before the first segment).
+struct PathEvent {
+  enum class Kind : std::uint8_t { process, dwell, comment } kind = Kind::process;
+  std::size_t point = 0;
+  ProcessEvent event;         ///< kind process
+  double seconds = 0.0;       ///< kind dwell
+  std::string text;           ///< kind comment
+  std::uint32_t line = 0;
+};
+
+/// Ordered path points in W with the events between them. Segment i goes from point i−1 to point i.
+struct ToolPath {
+  std::vector<PathPoint> points;
+  std::vector<ArcGeometry> arcs;  ///< in the coordinates of `words`
+  std::vector<PathEvent> events;  ///< sorted by point, program order within a point
+};
+
+}  // namespace smoothpost

@@ -1,0 +1,148 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "kernels/core/body.h"
+#include "kernels/core/joints.h"
+#include "kernels/core/pose.h"
+#include "kernels/core/process.h"
+#include "kernels/kinematics/screw_chain.h"
+
+// A machine as its definition file describes it, in mm, rad and s. Values are validated by
+// machine_file.h and const from then on.
+namespace smoothpost {
+
+enum class LimitSource { datasheet, measured, assumed };
+
+struct AxisDefinition {
+  std::string name;
+  char letter = 'X';  ///< the word that commands it in this machine's programs
+  ChainJoint joint;   ///< kind, side, screw, position range, home, cyclic, redundant
+  double velocity = 0.0;
+  double acceleration = 0.0;
+  double jerk = 0.0;
+  LimitSource source = LimitSource::assumed;
+};
+
+struct ToolDefinition {
+  Vec3 tip = Vec3::Zero();         ///< in the last link, mm; where a tool of length 0 has its tip
+  Vec3 axis = Vec3::UnitZ();       ///< unit, from tip to holder
+  double gap = 0.0;                ///< nominal distance tip to part while the beam is on, mm
+  double land_radius = 0.0;
+  double min_gap = 0.0;
+};
+
+struct WorkpieceDefinition {
+  Pose frame = Pose::Identity();  ///< X_MW with every joint 0
+  double thickness = 0.0;
+};
+
+struct CycleSettings {
+  double time = 0.001;       ///< s, the controller's cycle
+  double min_block = 0.004;  ///< s
+  int look_ahead_blocks = 0;
+};
+
+enum class Following { none, additive, exclusive };
+struct StandoffSettings {
+  std::string axis;  ///< empty: none
+  Following following = Following::exclusive;
+  double reserve = 5.0;
+};
+
+enum class RapidMotion { linear, independent };
+struct LinkSettings {
+  double clearance = 0.0;     ///< mm along the tool axis
+  std::string retract_axis;   ///< axis name
+  double retract = 0.0;       ///< its position for a retract, mm
+  double rotation = 0.0;      ///< rad
+  RapidMotion rapid = RapidMotion::linear;
+  std::string rewind = "links_only";
+};
+
+/// Shares of the tip and axis tolerance; they sum to 1.
+struct ToleranceBudget {
+  double merge = 0.10;
+  double smoothing = 0.40;
+  double chord = 0.15;
+  double rounding = 0.05;
+  double controller = 0.30;
+};
+
+struct ToleranceSettings {
+  double tip = 0.01;    ///< mm
+  double axis = 0.0;    ///< rad
+  double lead = 0.0;    ///< rad
+  double tilt = 0.0;    ///< rad
+  double clearance = 0.0;
+  double limit_share = 1.0;  ///< share of the velocity, acceleration and jerk limits that we plan with
+  ToleranceBudget budget;
+};
+
+struct RecipeSettings {
+  std::string kind = "five_axis";  ///< robot | laser | finishing | five_axis
+  std::string smoothing = "none";
+  std::string shape = "half";
+  std::string orientation = "programmed";
+  std::string optimise = "none";
+  std::string solver = "hybrid";
+  std::string schedule = "programmed";
+  int knot_every = 4;
+};
+
+struct DialectSettings {
+  std::string name = "linuxcnc";
+  std::string mode = "joint";   ///< joint | tcp
+  std::string units = "mm";     ///< mm | inch
+  std::string extension = "ngc";
+  int digits_length = 5;        ///< decimals of lengths, in `units`
+  int digits_angle = 6;         ///< decimals of angles, in degrees
+  double block_time = 0.010;    ///< s
+  bool line_numbers = true;
+  std::vector<std::string> start;
+  std::vector<std::string> end;
+  bool offset_guard = true;
+};
+
+/// Tip speed (mm/s) to power (percent), monotone; empty when the machine has no beam power.
+struct PowerTable {
+  std::vector<double> speed;
+  std::vector<double> percent;
+  double min_percent = 0.0;
+  double min_cut_speed = 0.0;
+};
+
+struct MachineDefinition {
+  std::string name;
+  std::string description;
+  std::vector<AxisDefinition> axes;
+  ToolDefinition tool;
+  WorkpieceDefinition workpiece;
+  std::vector<Body> bodies;
+  CycleSettings cycle;
+  StandoffSettings standoff;
+  LinkSettings links;
+  ToleranceSettings tolerance;
+  RecipeSettings recipe;
+  DialectSettings dialect;
+  ProcessTable process;
+  PowerTable power;
+
+  int size() const { return static_cast<int>(axes.size()); }
+  /// Index of the axis with that word letter, or −1.
+  int axis_by_letter(char letter) const;
+  /// Index of the axis with that name, or −1.
+  int axis_by_name(const std::string& axis_name) const;
+  bool has_event(const std::string& event) const;
+};
+
+/// The machine's chain with a tool of `tool_length` mm: tip at tool.tip − tool_length · tool.axis.
+/// X_MT(0) has the tip as origin and the identity as rotation.
+ScrewChain chain_of(const MachineDefinition& machine, double tool_length = 0.0);
+
+JointLimits limits_of(const MachineDefinition& machine);
+JointVector home_of(const MachineDefinition& machine);
+
+}  // namespace smoothpost
