@@ -1,9 +1,10 @@
 # One directory two levels deep = one component = one static target = one row of tests/tools/layers.txt.
 
 # smoothpost_add_component(kernels/smooth DEPENDS kernels/core Eigen3::Eigen PRIVATE some::library)
+# [NO_PRECOMPILED]
 # makes smoothpost_kernels_smooth and its alias smoothpost::kernels_smooth from the .cpp files there.
 function(smoothpost_add_component path)
-  cmake_parse_arguments(ARG "" "" "DEPENDS;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "NO_PRECOMPILED" "" "DEPENDS;PRIVATE" ${ARGN})
   string(REPLACE "/" "_" name ${path})
   file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${path}/*.cpp)
   set(links "")
@@ -19,6 +20,14 @@ function(smoothpost_add_component path)
     add_library(smoothpost_${name} STATIC ${sources})
     target_include_directories(smoothpost_${name} PUBLIC ${PROJECT_SOURCE_DIR})
     target_link_libraries(smoothpost_${name} PUBLIC ${links} PRIVATE ${ARG_PRIVATE})
+    # Eigen and the standard library are most of every compilation: one precompiled header serves all
+    # components, except those whose libraries bring compiler flags of their own (NO_PRECOMPILED).
+    if(name STREQUAL "kernels_core")
+      target_precompile_headers(smoothpost_${name} PRIVATE
+        <Eigen/Geometry> <Eigen/LU> <algorithm> <array> <cmath> <map> <optional> <string> <string_view> <vector>)
+    elseif(NOT ARG_NO_PRECOMPILED)
+      target_precompile_headers(smoothpost_${name} REUSE_FROM smoothpost_kernels_core)
+    endif()
   else()
     add_library(smoothpost_${name} INTERFACE)
     target_include_directories(smoothpost_${name} INTERFACE ${PROJECT_SOURCE_DIR})

@@ -19,28 +19,28 @@ struct WorkOffset {
 
 /// What the interpreter must know of the input's controller and machine.
 struct InterpreterSettings {
-  bool inch_default = false;                ///< unit before the first G20/G21
-  bool execute_deleted = true;              ///< lines with / run (block delete switch off)
-  AxisMask axes = 0x1ff;                    ///< axis words that the input machine has; others are refused
-  bool any_axis_needs_machine = false;      ///< rotary words are refused: no input machine was named
-  std::map<int, double> tool_lengths;       ///< mm, by tool number
-  std::map<int, WorkOffset> work_offsets;   ///< by system 1..9 (G54..G59.3); absent: 0
-  AxisWords home{};                         ///< where the axes stand before the program; also G28/G30
-  ProcessTable process;                     ///< words <-> events of the input machine
-  bool has_tcp = true;                      ///< M428/M429 are known
+  bool inch_default = false;    ///< unit before the first G20/G21
+  bool execute_deleted = true;  ///< lines with / run (block delete switch off)
+  AxisMask axes = 0x1ff;        ///< axis words that the input machine has; others are refused
+  bool any_axis_needs_machine = false;     ///< rotary words are refused: no input machine was named
+  std::map<int, double> tool_lengths;      ///< mm, by tool number
+  std::map<int, WorkOffset> work_offsets;  ///< by system 1..9 (G54..G59.3); absent: 0
+  AxisWords home{};      ///< where the axes stand before the program; also G28/G30
+  ProcessTable process;  ///< words <-> events of the input machine
+  bool has_tcp = true;   ///< M428/M429 are known
 };
 
 struct InterpretationSummary {
   bool uses_tcp = false;
   bool uses_rotary = false;
-  bool ended = false;            ///< M2, M30 or a second %
-  std::vector<int> tools;        ///< tool numbers that were changed to, in order
-  std::vector<int> work_systems; ///< systems used by motions, in order of first use
+  bool ended = false;             ///< M2, M30 or a second %
+  std::vector<int> tools;         ///< tool numbers that were changed to, in order
+  std::vector<int> work_systems;  ///< systems used by motions, in order of first use
 };
 
-/// Runs the program through the modal state of RS274NGC as LinuxCNC defines it and calls `sink` for every
-/// motion, dwell, event and comment in the order in which that controller would act.
-/// Errors are collected: reading goes on after a bad block so that one run names every problem, but then
+/// Runs the program through the modal state of RS274NGC as LinuxCNC defines it and calls `sink` for
+/// every motion, dwell, event and comment in the order in which that controller would act. Errors
+/// are collected: reading goes on after a bad block so that one run names every problem, but then
 /// the result has no value and what `sink` got is not a program.
 Result<InterpretationSummary> interpret(const Program& program, const InterpreterSettings& settings,
                                         CanonicalSink& sink);

@@ -7,7 +7,8 @@
 
 namespace smoothpost::nc {
 
-/// A parsed program and what is wrong with its text. The program is complete even when there are errors.
+/// A parsed program and what is wrong with its text. The program is complete even when there are
+/// errors.
 struct ParsedProgram {
   Program program;
   Diagnostics diagnostics;

@@ -104,6 +104,7 @@ struct DialectSettings {
   std::vector<std::string> start;
   std::vector<std::string> end;
   bool offset_guard = true;
+  std::string path_mode = "exact";  ///< exact | blend
 };
 
 /// Tip speed (mm/s) to power (percent), monotone; empty when the machine has no beam power.

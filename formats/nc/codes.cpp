@@ -1,0 +1,183 @@
+#include "formats/nc/codes.h"
+
+#include <algorithm>
+#include <array>
+
+namespace smoothpost::nc {
+namespace {
+
+struct Row {
+  GCode code;
+  GGroup group;
+  GStatus status;
+  const char* name;
+};
+
+constexpr auto kRead = GStatus::read;
+constexpr auto kLater = GStatus::later;
+constexpr auto kTcp = GStatus::tcp;
+
+constexpr Row kRows[] = {
+    {0, GGroup::motion, kRead, "rapid"},
+    {10, GGroup::motion, kRead, "straight feed"},
+    {20, GGroup::motion, kRead, "clockwise arc"},
+    {30, GGroup::motion, kRead, "counter-clockwise arc"},
+    {40, GGroup::non_modal, kRead, "dwell"},
+    {50, GGroup::motion, kLater, "cubic spline"},
+    {51, GGroup::motion, kLater, "quadratic spline (on a Fanuc: look-ahead control)"},
+    {52, GGroup::motion, kLater, "NURBS"},
+    {53, GGroup::non_modal, kLater, "end of NURBS"},
+    {70, GGroup::lathe_diameter, kLater, "lathe diameter mode"},
+    {80, GGroup::lathe_diameter, kLater, "lathe radius mode"},
+    {100, GGroup::non_modal, kRead, "setting of offsets"},
+    {170, GGroup::plane, kRead, "XY plane"},
+    {171, GGroup::plane, kLater, "UV plane"},
+    {180, GGroup::plane, kRead, "XZ plane"},
+    {181, GGroup::plane, kLater, "UW plane"},
+    {190, GGroup::plane, kRead, "YZ plane"},
+    {191, GGroup::plane, kLater, "VW plane"},
+    {200, GGroup::units, kRead, "inch"},
+    {210, GGroup::units, kRead, "millimetre"},
+    {280, GGroup::non_modal, kRead, "home position"},
+    {281, GGroup::non_modal, kRead, "storing of the home position"},
+    {300, GGroup::non_modal, kRead, "second home position"},
+    {301, GGroup::non_modal, kRead, "storing of the second home position"},
+    {330, GGroup::motion, kLater, "spindle-synchronised motion"},
+    {331, GGroup::motion, kLater, "rigid tapping"},
+    {382, GGroup::motion, kLater, "probing"},
+    {383, GGroup::motion, kLater, "probing"},
+    {384, GGroup::motion, kLater, "probing"},
+    {385, GGroup::motion, kLater, "probing"},
+    {400, GGroup::radius_compensation, kRead, "end of cutter radius compensation"},
+    {410, GGroup::radius_compensation, kLater, "cutter radius compensation"},
+    {411, GGroup::radius_compensation, kLater, "cutter radius compensation"},
+    {420, GGroup::radius_compensation, kLater, "cutter radius compensation"},
+    {421, GGroup::radius_compensation, kLater, "cutter radius compensation"},
+    {430, GGroup::length_offset, kRead, "tool length offset"},
+    {431, GGroup::length_offset, kRead, "tool length offset by value"},
+    {432, GGroup::length_offset, kLater, "added tool length offset"},
+    {434, GGroup::length_offset, kTcp, "Fanuc tool-centre-point control with rotary positions"},
+    {435, GGroup::length_offset, kTcp, "Fanuc tool-centre-point control with tool vectors"},
+    {490, GGroup::length_offset, kRead, "end of tool length offset"},
+    {520, GGroup::non_modal, kRead, "local offset"},
+    {530, GGroup::non_modal, kRead, "machine coordinates"},
+    {531, GGroup::non_modal, kTcp, "tool axis direction control"},
+    {540, GGroup::work_system, kRead, "work system 1"},
+    {544, GGroup::work_system, kTcp, "workpiece setting error compensation"},
+    {550, GGroup::work_system, kRead, "work system 2"},
+    {560, GGroup::work_system, kRead, "work system 3"},
+    {570, GGroup::work_system, kRead, "work system 4"},
+    {580, GGroup::work_system, kRead, "work system 5"},
+    {590, GGroup::work_system, kRead, "work system 6"},
+    {591, GGroup::work_system, kRead, "work system 7"},
+    {592, GGroup::work_system, kRead, "work system 8"},
+    {593, GGroup::work_system, kRead, "work system 9"},
+    {610, GGroup::path_control, kRead, "exact path"},
+    {611, GGroup::path_control, kRead, "exact stop"},
+    {640, GGroup::path_control, kRead, "path blending"},
+    {680, GGroup::non_modal, kLater, "coordinate rotation"},
+    {682, GGroup::non_modal, kTcp, "tilted work plane"},
+    {683, GGroup::non_modal, kTcp, "tilted work plane by tool axis"},
+    {690, GGroup::non_modal, kLater, "end of coordinate rotation or tilted work plane"},
+    {730, GGroup::motion, kLater, "canned cycle"},
+    {740, GGroup::motion, kLater, "canned cycle"},
+    {760, GGroup::motion, kLater, "threading cycle"},
+    {800, GGroup::motion, kRead, "end of motion mode"},
+    {810, GGroup::motion, kLater, "canned cycle"},
+    {820, GGroup::motion, kLater, "canned cycle"},
+    {830, GGroup::motion, kLater, "canned cycle"},
+    {840, GGroup::motion, kLater, "canned cycle"},
+    {850, GGroup::motion, kLater, "canned cycle"},
+    {860, GGroup::motion, kLater, "canned cycle"},
+    {870, GGroup::motion, kLater, "canned cycle"},
+    {880, GGroup::motion, kLater, "canned cycle"},
+    {890, GGroup::motion, kLater, "canned cycle"},
+    {900, GGroup::distance, kRead, "absolute words"},
+    {901, GGroup::arc_distance, kRead, "absolute arc centres"},
+    {910, GGroup::distance, kRead, "incremental words"},
+    {911, GGroup::arc_distance, kRead, "incremental arc centres"},
+    {920, GGroup::non_modal, kRead, "shift of the zero"},
+    {921, GGroup::non_modal, kRead, "end of shift"},
+    {922, GGroup::non_modal, kRead, "end of shift, stored"},
+    {923, GGroup::non_modal, kRead, "stored shift"},
+    {930, GGroup::feed_mode, kRead, "inverse time feed"},
+    {940, GGroup::feed_mode, kRead, "feed by the minute"},
+    {950, GGroup::feed_mode, kLater, "feed by the turn"},
+    {960, GGroup::spindle_mode, kLater, "constant surface speed"},
+    {970, GGroup::spindle_mode, kRead, "spindle speed"},
+    {980, GGroup::retract, kRead, "retract to the old height"},
+    {990, GGroup::retract, kRead, "retract to the R height"},
+    {1680, GGroup::non_modal, kTcp, "Okuma tool-centre-point control"},
+    {1690, GGroup::non_modal, kTcp, "Okuma tool-centre-point control"},
+    {1700, GGroup::non_modal, kTcp, "Okuma end of tool-centre-point control"},
+    {2340, GGroup::non_modal, kTcp, "Haas tool-centre-point control"},
+    {2540, GGroup::non_modal, kTcp, "Haas dynamic work offset"},
+};
+
+constexpr std::size_t kTableSize = 1000;
+
+constexpr std::array<GCodeInfo, kTableSize> make_table() {
+  std::array<GCodeInfo, kTableSize> table{};
+  for (const Row& row : kRows) {
+    if (row.code < static_cast<GCode>(kTableSize)) {
+      table[static_cast<std::size_t>(row.code)] = {row.status, row.group, row.name};
+    }
+  }
+  return table;
+}
+constexpr std::array<GCodeInfo, kTableSize> kTable = make_table();
+constexpr GCodeInfo kUnknown{};
+
+}  // namespace
+
+const GCodeInfo& g_code_info(GCode code) {
+  if (code >= 0 && static_cast<std::size_t>(code) < kTableSize) {
+    return kTable[static_cast<std::size_t>(code)];
+  }
+  static constexpr auto kTcpRows = [] {
+    std::array<GCodeInfo, std::size(kRows)> rows{};
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      rows[i] = {kRows[i].status, kRows[i].group, kRows[i].name};
+    }
+    return rows;
+  }();
+  for (std::size_t i = 0; i < std::size(kRows); ++i) {
+    if (kRows[i].code == code) return kTcpRows[i];
+  }
+  return kUnknown;
+}
+
+std::string g_code_text(GCode code) {
+  std::string text = "G" + std::to_string(code / 10);
+  if (code % 10 != 0) text += "." + std::to_string(code % 10);
+  return text;
+}
+
+int m_group(int m) {
+  if (m == 0 || m == 1 || m == 2 || m == 30 || m == 60) return 4;
+  if (m >= 62 && m <= 68) return 5;
+  if (m == 6 || m == 61) return 6;
+  if ((m >= 3 && m <= 5) || m == 19) return 7;
+  if (m >= 7 && m <= 9) return 8;
+  if (m >= 48 && m <= 53) return 9;
+  if (m >= 70 && m <= 73) return 5;
+  if (m >= 98 && m <= 99) return 11;
+  if (m >= 100 && m <= 999) return 10;
+  return -1;
+}
+
+int m_rank(int m) {
+  constexpr int kOrder[] = {/*4*/ 7, /*5*/ 0, /*6*/ 1,  /*7*/ 2,
+                            /*8*/ 3, /*9*/ 4, /*10*/ 5, /*11*/ 6};
+  const int group = m_group(m);
+  return group < 4 ? 5 : kOrder[group - 4];
+}
+
+const char* m_refusal(int m) {
+  if (m == 98 || m == 99) return "a subroutine call or return is read in a later version";
+  if (m == 61) return "setting the tool number without a change is read in a later version";
+  if (m >= 70 && m <= 73) return "saving and restoring modal state is read in a later version";
+  return nullptr;
+}
+
+}  // namespace smoothpost::nc

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <array>
+
+#include "formats/nc/interpreter.h"
+#include "kernels/core/canonical_motion.h"
+
+namespace smoothpost::nc {
+
+inline constexpr int kWorkSystems = 9;
+
+/// Where the controlled point is and how programmed words become world coordinates. mm and rad.
+///
+/// With p the programmed words, s the shift (G92, G52), o and φ the offset and XY rotation of the
+/// active work system, and t the tool length offset:   world = Rz(φ)·(p + s) + o,   machine = world
+/// + t. G92 and G52 set one and the same shift, as in LinuxCNC.
+class Coordinates {
+ public:
+  explicit Coordinates(const InterpreterSettings& settings);
+
+  /// Position of the controlled point: world coordinates without tool length.
+  const AxisWords& world() const { return world_; }
+  AxisMask unknown() const { return unknown_; }
+  const AxisWords& tool() const { return tool_; }
+  int system() const { return system_; }
+  const WorkOffset& offset(int system) const { return systems_[static_cast<std::size_t>(system)]; }
+  const AxisWords& shift() const { return shift_; }
+
+  AxisWords world_from_program(const AxisWords& program) const;
+  AxisWords program_from_world(const AxisWords& world) const;
+  Vec3 world_from_program(const Vec3& program) const;
+  /// A direction, turned by the rotation of the active system.
+  Vec3 world_direction(const Vec3& direction) const;
+  /// The program's zero in world coordinates: Rz(φ)·s + o.
+  Vec3 origin() const;
+  double rotation() const { return offset(system_).rotation; }
+  /// X and Y words mix: a rotation is active.
+  bool rotated() const { return rotated_; }
+
+  /// Axis letters that hang together with `words` through the XY rotation.
+  AxisMask unknown_after(AxisMask words) const;
+
+  void move_to(const AxisWords& world, AxisMask unknown) {
+    world_ = world;
+    unknown_ = unknown;
+  }
+  void forget(AxisMask words) { unknown_ = static_cast<AxisMask>(unknown_ | words); }
+
+  /// The machine stays where it is; the controlled point becomes another one.
+  void set_tool(const AxisWords& tool);
+  void select_system(int system);
+  void set_offset(int system, const WorkOffset& offset);
+  void set_shift(const AxisWords& shift);
+  /// G92.2 and G92.3.
+  void store_shift() { stored_shift_ = shift_; }
+  const AxisWords& stored_shift() const { return stored_shift_; }
+
+ private:
+  void refresh();
+
+  AxisWords world_{};
+  AxisMask unknown_ = 0x1ff;
+  AxisWords tool_{};
+  AxisWords shift_{};
+  AxisWords stored_shift_{};
+  std::array<WorkOffset, kWorkSystems + 1> systems_{};
+  int system_ = 1;
+  bool rotated_ = false;
+  double cosine_ = 1.0;
+  double sine_ = 0.0;
+};
+
+}  // namespace smoothpost::nc

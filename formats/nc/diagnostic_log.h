@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "kernels/core/diagnostic.h"
+
+namespace smoothpost::nc {
+
+/// A place in the program text; both count from 1.
+struct TextPlace {
+  std::uint32_t line = 0;
+  std::uint32_t column = 0;
+};
+
+/// Collects diagnostics of one file; of each severity the first kLimit are kept, the others
+/// counted.
+class DiagnosticLog {
+ public:
+  static constexpr std::size_t kLimit = 100;
+
+  explicit DiagnosticLog(std::string file) : file_(std::move(file)) {}
+
+  void error(const char* code, std::string text, TextPlace place) {
+    add(Severity::error, code, std::move(text), place);
+  }
+  void warning(const char* code, std::string text, TextPlace place) {
+    add(Severity::warning, code, std::move(text), place);
+  }
+  void note(const char* code, std::string text, TextPlace place) {
+    add(Severity::note, code, std::move(text), place);
+  }
+  bool has_error() const { return counts_[static_cast<std::size_t>(Severity::error)] > 0; }
+  std::size_t errors() const { return counts_[static_cast<std::size_t>(Severity::error)]; }
+
+  /// The diagnostics in order of the file; when some were left out a closing note gives the counts.
+  Diagnostics take();
+
+ private:
+  void add(Severity severity, const char* code, std::string text, TextPlace place);
+
+  std::string file_;
+  Diagnostics list_;
+  std::size_t counts_[3] = {0, 0, 0};
+};
+
+}  // namespace smoothpost::nc

@@ -1,0 +1,239 @@
+#include <algorithm>
+#include <cmath>
+
+#include "formats/nc/arc.h"
+#include "formats/nc/executor.h"
+#include "formats/nc/number_text.h"
+#include "kernels/core/units.h"
+
+namespace smoothpost::nc {
+namespace {
+
+constexpr AxisMask kRotaryAxes = 0x38;
+constexpr double kNoMove = 1e-7;  // mm or rad; smaller displacements have no length for the feed
+
+// LinuxCNC's tolerances, by the active unit, in mm.
+constexpr double kCentreToleranceMillimetre = 0.0282843;
+constexpr double kCentreToleranceInch = 0.0028284 * kMillimetresPerInch;
+constexpr double kRadiusTolerance = 0.00005 * kMillimetresPerInch;
+
+bool is_rotary(std::size_t axis) { return axis >= 3 && axis < 6; }
+
+double length(const AxisWords& start, const AxisWords& end, std::size_t first) {
+  const double a = end[first] - start[first];
+  const double b = end[first + 1] - start[first + 1];
+  const double c = end[first + 2] - start[first + 2];
+  return std::sqrt(a * a + b * b + c * c);
+}
+
+/// Axes of a plane: first, second, and the one along its normal.
+struct PlaneAxes {
+  std::size_t first;
+  std::size_t second;
+  std::size_t third;
+  char first_centre;
+  char second_centre;
+  char wrong_centre;
+  const char* name;
+};
+
+PlaneAxes plane_axes(GCode plane) {
+  if (plane == 180) return {2, 0, 1, 'K', 'I', 'J', "G18 (ZX)"};
+  if (plane == 190) return {1, 2, 0, 'J', 'K', 'I', "G19 (YZ)"};
+  return {0, 1, 2, 'I', 'J', 'K', "G17 (XY)"};
+}
+
+AxisMask bit(std::size_t axis) { return static_cast<AxisMask>(1u << axis); }
+
+}  // namespace
+
+double Executor::word_value(const BlockWords& block, std::size_t axis) const {
+  const double value = block[kAxisLetters[axis]];
+  return is_rotary(axis) ? radians_from_degrees(value) : value * modal_.unit;
+}
+
+AxisWords Executor::target(const BlockWords& block, AxisMask axes) const {
+  if (!coordinates_.rotated()) {
+    AxisWords world = coordinates_.world();
+    const AxisWords& origin = coordinates_.offset(coordinates_.system()).words;
+    const AxisWords& shift = coordinates_.shift();
+    for (std::size_t i = 0; i < world.size(); ++i) {
+      if ((axes & bit(i)) == 0) continue;
+      const double value = word_value(block, i);
+      world[i] = modal_.incremental ? world[i] + value : value + shift[i] + origin[i];
+    }
+    return world;
+  }
+  AxisWords program = coordinates_.program_from_world(coordinates_.world());
+  for (std::size_t i = 0; i < program.size(); ++i) {
+    if ((axes & bit(i)) == 0) continue;
+    const double value = word_value(block, i);
+    program[i] = modal_.incremental ? program[i] + value : value;
+  }
+  return coordinates_.world_from_program(program);
+}
+
+AxisWords Executor::machine_target(const BlockWords& block, AxisMask axes) const {
+  AxisWords world = coordinates_.world();
+  for (std::size_t i = 0; i < world.size(); ++i) {
+    if ((axes & bit(i)) != 0) world[i] = word_value(block, i) - coordinates_.tool()[i];
+  }
+  return world;
+}
+
+AxisMask Executor::unknown_at_target(AxisMask axes) const {
+  return modal_.incremental ? coordinates_.unknown_after(0) : coordinates_.unknown_after(axes);
+}
+
+void Executor::begin_motion(const BlockWords& block, const BlockPlan& plan) {
+  motion_.is_arc = false;
+  motion_.tcp = modal_.tcp;
+  motion_.machine_position = false;
+  motion_.unknown_start = coordinates_.unknown();
+  motion_.programmed = plan.axes;
+  motion_.line = block.line;
+  motion_.duration = 0.0;
+  motion_.start = coordinates_.world();
+  motion_.column = reader_.place(block, block.first_piece).column;
+  summary_.uses_tcp = summary_.uses_tcp || modal_.tcp;
+  summary_.uses_rotary = summary_.uses_rotary || (plan.axes & kRotaryAxes) != 0;
+}
+
+void Executor::finish_motion() {
+  if (offset_dirty_) announce_offset(motion_.line);
+  sink_.motion(motion_);
+  coordinates_.move_to(motion_.end, motion_.unknown_end);
+}
+
+/// Seconds of a feed motion: G93 gives the time; else F is the speed of XYZ when one of them moves,
+/// else of UVW, else of ABC.
+double Executor::duration_of(const CanonicalMotion& motion, double xyz_length,
+                             const BlockWords& block) const {
+  const double uvw = length(motion.start, motion.end, 6);
+  const double abc = length(motion.start, motion.end, 3);
+  if (xyz_length < kNoMove && uvw < kNoMove && abc < kNoMove) return 0.0;
+  if (modal_.inverse_time) return kSecondsPerMinute / block['F'];
+  if (xyz_length >= kNoMove) return xyz_length / modal_.linear_feed;
+  return uvw >= kNoMove ? uvw / modal_.linear_feed : abc / modal_.angular_feed;
+}
+
+bool Executor::feed_given(const BlockWords& block, const BlockPlan& plan) {
+  const std::string code = g_code_text(plan.motion);
+  if (modal_.inverse_time) {
+    if (block.has('F') && block['F'] > 0.0) return true;
+    log_.error("NC214", code + " in inverse time mode (G93) needs F above 0 in its own block",
+               at(block, GGroup::motion));
+    return false;
+  }
+  if (modal_.linear_feed > 0.0) return true;
+  log_.error("NC213",
+             code + " with zero feed: F was not given" +
+                 (block.has('F') ? " above 0" : " (after G93 a new F is needed)") +
+                 "; write F before or in this block",
+             at(block, GGroup::motion));
+  return false;
+}
+
+void Executor::motion(const BlockWords& block, const BlockPlan& plan) {
+  const GCode mode = block.code(GGroup::motion);
+  if (mode != kNoCode) modal_.motion = mode;
+  if (plan.motion == kNoCode || plan.motion == kRefusedMotion) return;
+  const bool feeds = plan.motion != 0;
+  const bool arc_motion = plan.motion == 20 || plan.motion == 30;
+  if (feeds && !feed_given(block, plan)) {
+    coordinates_.move_to(target(block, plan.axes), unknown_at_target(plan.axes));
+    return;
+  }
+  if (arc_motion) {
+    arc(block, plan);
+  } else if (plan.axes != 0) {
+    straight(block, plan);
+  }
+}
+
+void Executor::straight(const BlockWords& block, const BlockPlan& plan) {
+  begin_motion(block, plan);
+  motion_.kind = plan.motion == 0 ? MotionKind::rapid : MotionKind::feed;
+  if (block.code(GGroup::non_modal) == 530) {
+    motion_.machine_position = true;
+    motion_.end = machine_target(block, plan.axes);
+    motion_.unknown_end = static_cast<AxisMask>(coordinates_.unknown() & ~plan.axes);
+  } else {
+    motion_.end = target(block, plan.axes);
+    motion_.unknown_end = unknown_at_target(plan.axes);
+  }
+  if (motion_.kind == MotionKind::feed) {
+    motion_.duration = duration_of(motion_, length(motion_.start, motion_.end, 0), block);
+  }
+  finish_motion();
+}
+
+void Executor::arc(const BlockWords& block, const BlockPlan& plan) {
+  const PlaneAxes plane = plane_axes(modal_.plane);
+  const std::string code = g_code_text(plan.motion);
+  begin_motion(block, plan);
+  motion_.kind = MotionKind::feed;
+  motion_.is_arc = true;
+  motion_.end = target(block, plan.axes);
+  motion_.unknown_end = unknown_at_target(plan.axes);
+  const AxisWords start = coordinates_.program_from_world(motion_.start);
+  const AxisWords end = coordinates_.program_from_world(motion_.end);
+  const bool centre_form = block.has('I') || block.has('J') || block.has('K');
+
+  std::string problem;
+  if (block.has('R') && centre_form) {
+    problem = "both R and I J K are given";
+  } else if (!block.has('R') && !centre_form) {
+    problem = "neither R nor I J K is given";
+  } else if (block.has(plane.wrong_centre)) {
+    problem = std::string(1, plane.wrong_centre) + " has no meaning in the plane " + plane.name;
+  } else if (centre_form && modal_.arc_absolute &&
+             !(block.has(plane.first_centre) && block.has(plane.second_centre))) {
+    problem = std::string("absolute centres (G90.1) need both ") + plane.first_centre + " and " +
+              plane.second_centre;
+  } else if (!centre_form && (plan.axes & (bit(plane.first) | bit(plane.second))) == 0) {
+    problem = std::string("an arc by radius needs an end in the plane ") + plane.name;
+  }
+  if (!problem.empty()) {
+    log_.error("NC220", code + ": " + problem + "; let the CAM post write one centre form",
+               at(block, GGroup::motion));
+    coordinates_.move_to(motion_.end, motion_.unknown_end);
+    return;
+  }
+
+  ArcWords words;
+  words.start = {start[plane.first], start[plane.second]};
+  words.end = {end[plane.first], end[plane.second]};
+  words.clockwise = plan.motion == 20;
+  words.turns = block.has('P') ? static_cast<int>(std::lround(block['P'])) : 1;
+  words.centre_tolerance = modal_.unit == 1.0 ? kCentreToleranceMillimetre : kCentreToleranceInch;
+  words.radius_tolerance = kRadiusTolerance;
+  PlaneArc found;
+  if (centre_form) {
+    const double i = block.has(plane.first_centre) ? block[plane.first_centre] * modal_.unit : 0.0;
+    const double j =
+        block.has(plane.second_centre) ? block[plane.second_centre] * modal_.unit : 0.0;
+    const PlanePoint base = modal_.arc_absolute ? PlanePoint{} : words.start;
+    found = arc_by_centre(words, {base.first + i, base.second + j});
+  } else {
+    found = arc_by_radius(words, block['R'] * modal_.unit);
+  }
+  if (!found.problem.empty()) {
+    log_.error("NC221", code + ": " + found.problem, at(block, GGroup::motion));
+    coordinates_.move_to(motion_.end, motion_.unknown_end);
+    return;
+  }
+  Vec3 centre(start[0], start[1], start[2]);
+  centre[static_cast<Eigen::Index>(plane.first)] = found.centre.first;
+  centre[static_cast<Eigen::Index>(plane.second)] = found.centre.second;
+  Vec3 normal = Vec3::Zero();
+  normal[static_cast<Eigen::Index>(plane.third)] = 1.0;
+  motion_.arc.centre = coordinates_.world_from_program(centre);
+  motion_.arc.normal = coordinates_.world_direction(normal);
+  motion_.arc.sweep = found.sweep;
+  const double climb = end[plane.third] - start[plane.third];
+  motion_.duration = duration_of(motion_, std::hypot(found.radius * found.sweep, climb), block);
+  finish_motion();
+}
+
+}  // namespace smoothpost::nc

@@ -1,0 +1,209 @@
+#include <algorithm>
+#include <cmath>
+
+#include "formats/nc/executor.h"
+#include "formats/nc/number_text.h"
+#include "kernels/core/units.h"
+
+namespace smoothpost::nc {
+namespace {
+
+constexpr std::size_t kZ = 2;
+
+AxisMask bit(std::size_t axis) { return static_cast<AxisMask>(1u << axis); }
+
+/// G54 is 1, G59.3 is 9.
+int system_of(GCode code) { return code <= 590 ? (code - 540) / 10 + 1 : 6 + (code - 590); }
+
+}  // namespace
+
+void Executor::tool_length(const BlockWords& block) {
+  const GCode code = block.code(GGroup::length_offset);
+  if (code == 490) return set_tool_length(0.0, 0, block.line);
+  if (code == 431) {
+    const AxisMask axes = axis_mask(block.letters);
+    if ((axes & ~bit(kZ)) != 0) {
+      log_.error("NC225", "G43.1 is read with Z only: the tool length along the tool axis",
+                 at(block, GGroup::length_offset));
+      return;
+    }
+    const double length = block.has('Z') ? block['Z'] * modal_.unit : coordinates_.tool()[kZ];
+    return set_tool_length(length, modal_.spindle_tool, block.line);
+  }
+  const int tool = block.has('H') ? static_cast<int>(std::lround(block['H'])) : modal_.spindle_tool;
+  if (tool == 0 && block.has('H')) return set_tool_length(0.0, 0, block.line);
+  if (tool == 0) {
+    log_.error("PR104",
+               "G43 without H, and no tool was changed to before: which length is meant is not "
+               "known; write H with the tool's number or a tool change before it",
+               at(block, GGroup::length_offset));
+    return;
+  }
+  const auto found = settings_.tool_lengths.find(tool);
+  if (found == settings_.tool_lengths.end()) {
+    const std::string number = std::to_string(tool);
+    log_.error("PR102",
+               "G43 needs the length of tool " + number +
+                   ", which the program does not contain; "
+                   "give it by --tool " +
+                   number + "=LENGTH (mm)",
+               at(block, GGroup::length_offset));
+    return;
+  }
+  set_tool_length(found->second, tool, block.line);
+}
+
+void Executor::set_tool_length(double length, int tool, std::uint32_t line) {
+  AxisWords offset{};
+  offset[kZ] = length;
+  const bool same = offset == coordinates_.tool() && tool == modal_.length_tool;
+  coordinates_.set_tool(offset);
+  modal_.length_tool = tool;
+  if (!same) sink_.tool_length(length, tool, line);
+}
+
+void Executor::work_system(const BlockWords& block) {
+  const int system = system_of(block.code(GGroup::work_system));
+  if (system == coordinates_.system()) return;
+  coordinates_.select_system(system);
+  offset_dirty_ = true;
+}
+
+void Executor::announce_offset(std::uint32_t line) {
+  offset_dirty_ = false;
+  const int system = coordinates_.system();
+  if (!systems_used_[static_cast<std::size_t>(system)]) {
+    systems_used_[static_cast<std::size_t>(system)] = true;
+    summary_.work_systems.push_back(system);
+  }
+  sink_.work_offset(coordinates_.origin(), coordinates_.rotation(), system, line);
+}
+
+void Executor::non_modal(const BlockWords& block, const BlockPlan& plan) {
+  switch (block.code(GGroup::non_modal)) {
+    case 100:
+      return set_work_offset(block, plan);
+    case 280:
+      return go_home(block, plan, first_home_);
+    case 300:
+      return go_home(block, plan, second_home_);
+    case 281:
+      return store_home(first_home_);
+    case 301:
+      return store_home(second_home_);
+    case 520:
+    case 920:
+    case 921:
+    case 922:
+    case 923:
+      return shift_zero(block, plan);
+    default:
+      return;  // G4 and G53 act elsewhere
+  }
+}
+
+/// A rapid through the programmed words, then a rapid of these axes (of all when none is
+/// programmed) to the home position.
+void Executor::go_home(const BlockWords& block, const BlockPlan& plan, HomePosition& home) {
+  motion_.kind = MotionKind::rapid;
+  if (plan.axes != 0) {
+    begin_motion(block, plan);
+    motion_.machine_position = true;
+    motion_.end = target(block, plan.axes);
+    motion_.unknown_end = unknown_at_target(plan.axes);
+    finish_motion();
+  }
+  const AxisMask moved = plan.axes != 0 ? plan.axes : settings_.axes;
+  begin_motion(block, plan);
+  motion_.machine_position = true;
+  motion_.end = motion_.start;
+  motion_.unknown_end = coordinates_.unknown();
+  for (std::size_t i = 0; i < motion_.end.size(); ++i) {
+    if ((moved & bit(i)) == 0) continue;
+    motion_.end[i] = home.machine[i] - coordinates_.tool()[i];
+    const auto set = static_cast<AxisMask>(motion_.unknown_end | bit(i));
+    motion_.unknown_end = (home.known & bit(i)) != 0 ? static_cast<AxisMask>(set ^ bit(i)) : set;
+  }
+  finish_motion();
+}
+
+void Executor::store_home(HomePosition& home) const {
+  for (std::size_t i = 0; i < home.machine.size(); ++i) {
+    home.machine[i] = coordinates_.world()[i] + coordinates_.tool()[i];
+  }
+  home.known = static_cast<AxisMask>(~coordinates_.unknown() & 0x1ff);
+}
+
+void Executor::set_work_offset(const BlockWords& block, const BlockPlan& plan) {
+  const int number = static_cast<int>(std::lround(block['P']));
+  const int system = number == 0 ? coordinates_.system() : number;
+  WorkOffset offset = coordinates_.offset(system);
+  if (block['L'] == 20.0) {
+    warn_unknown(block, plan.axes);
+    // The programmed words become the coordinates of the present point in that system.
+    Coordinates there = coordinates_;
+    there.select_system(system);
+    AxisWords program = there.program_from_world(coordinates_.world());
+    for (std::size_t i = 0; i < program.size(); ++i) {
+      if ((plan.axes & bit(i)) != 0) program[i] = word_value(block, i);
+    }
+    const AxisWords reached = there.world_from_program(program);
+    for (std::size_t i = 0; i < program.size(); ++i) {
+      offset.words[i] += coordinates_.world()[i] - reached[i];
+    }
+  } else {
+    for (std::size_t i = 0; i < offset.words.size(); ++i) {
+      if ((plan.axes & bit(i)) != 0) offset.words[i] = word_value(block, i);
+    }
+    if (block.has('R')) offset.rotation = radians_from_degrees(block['R']);
+  }
+  coordinates_.set_offset(system, offset);
+  if (system == coordinates_.system()) offset_dirty_ = true;
+}
+
+void Executor::shift_zero(const BlockWords& block, const BlockPlan& plan) {
+  if (plan.whole_comment) return;
+  AxisWords shift = coordinates_.shift();
+  switch (block.code(GGroup::non_modal)) {
+    case 520:
+      for (std::size_t i = 0; i < shift.size(); ++i) {
+        if ((plan.axes & bit(i)) != 0) shift[i] = word_value(block, i);
+      }
+      break;
+    case 920: {
+      warn_unknown(block, plan.axes);
+      const AxisWords program = coordinates_.program_from_world(coordinates_.world());
+      for (std::size_t i = 0; i < shift.size(); ++i) {
+        if ((plan.axes & bit(i)) != 0) shift[i] += program[i] - word_value(block, i);
+      }
+      break;
+    }
+    case 923:
+      shift = coordinates_.stored_shift();
+      break;
+    default:
+      shift = {};
+      break;
+  }
+  const GCode code = block.code(GGroup::non_modal);
+  coordinates_.set_shift(shift);
+  if (code == 520 || code == 920 || code == 921) coordinates_.store_shift();
+  offset_dirty_ = true;
+}
+
+void Executor::warn_unknown(const BlockWords& block, AxisMask words) {
+  const auto fresh = static_cast<AxisMask>(words & coordinates_.unknown() & ~unknown_told_);
+  if (fresh == 0) return;
+  unknown_told_ = static_cast<AxisMask>(unknown_told_ | fresh);
+  std::string letters;
+  for (std::size_t i = 0; i < kAxisLetters.size(); ++i) {
+    if ((fresh & bit(i)) != 0) letters += std::string(letters.empty() ? "" : " ") + kAxisLetters[i];
+  }
+  log_.warning("NC228",
+               g_code_text(block.code(GGroup::non_modal)) + " sets the zero of " + letters +
+                   " at a place that the program does not give: the axis is taken to stand at the "
+                   "input machine's home position; move there by a program word before",
+               at(block, GGroup::non_modal));
+}
+
+}  // namespace smoothpost::nc

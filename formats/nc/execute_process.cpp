@@ -1,0 +1,169 @@
+#include <cmath>
+#include <string_view>
+
+#include "formats/nc/executor.h"
+#include "formats/nc/number_text.h"
+
+namespace smoothpost::nc {
+namespace {
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kBlank = " \t";
+  const std::size_t begin = text.find_first_not_of(kBlank);
+  if (begin == std::string_view::npos) return {};
+  return text.substr(begin, text.find_last_not_of(kBlank) - begin + 1);
+}
+
+/// Whether `text` begins with `word`, in any case; then `rest` is what follows.
+bool begins_with(std::string_view text, std::string_view word) {
+  if (text.size() < word.size()) return false;
+  for (std::size_t i = 0; i < word.size(); ++i) {
+    const char c = text[i] >= 'a' && text[i] <= 'z' ? static_cast<char>(text[i] - 32) : text[i];
+    if (c != word[i]) return false;
+  }
+  return true;
+}
+
+bool is_active(std::string_view text) {
+  constexpr std::string_view kActive[] = {"DEBUG,",    "PRINT,",     "LOG,",
+                                          "LOGOPEN,",  "LOGCLOSE",   "LOGAPPEND,",
+                                          "PROBEOPEN", "PROBECLOSE", "ABORT,"};
+  for (const std::string_view word : kActive) {
+    if (begins_with(text, word)) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+void Executor::comment(const BlockWords& block) {
+  const Piece& piece = program_.pieces[block.comment_piece];
+  std::string_view text(program_.text);
+  text = text.substr(piece.begin, piece.length);
+  const bool parentheses = text.front() == '(';
+  text = trimmed(parentheses ? text.substr(1, text.size() - 2) : text.substr(1));
+  if (parentheses && begins_with(text, "MSG,")) {
+    ProcessEvent event;
+    event.name = event_name::kMessage;
+    event.parameters.emplace_back("text", std::string(trimmed(text.substr(4))));
+    event.line = block.line;
+    event.column = reader_.place(block, block.comment_piece).column;
+    sink_.event(event);
+    return;
+  }
+  if (parentheses && is_active(text)) {
+    log_.note("NC231", "an active comment is kept as plain text; it does nothing here",
+              reader_.place(block, block.comment_piece));
+  }
+  if (!text.empty()) sink_.comment(text, block.line);
+}
+
+void Executor::speed_and_tool(const BlockWords& block, const BlockPlan& plan) {
+  if (block.has('T') && (plan.taken & letter_bit('T')) == 0) {
+    modal_.words.tool = static_cast<int>(std::lround(block['T']));
+  }
+  if (!block.has('S') || (plan.taken & letter_bit('S')) != 0) return;
+  const bool changed = block['S'] != modal_.words.speed;
+  modal_.words.speed = block['S'];
+  if (!changed || modal_.spindle_row == nullptr) return;
+  for (int i = 0; i < block.m_count; ++i) {
+    if (m_group(block.m[static_cast<std::size_t>(i)]) == 7) return;  // that one says it
+  }
+  for (int i = 0; i < plan.action_count; ++i) {
+    const EventRow* row = plan.actions[static_cast<std::size_t>(i)].row;
+    if (row == nullptr) continue;
+    for (const RowWord& word : row->words) {
+      if (word.letter == 'S') return;  // S belongs to that row
+    }
+  }
+  emit_event(*modal_.spindle_row, block, block.piece[static_cast<std::size_t>(letter_index('S'))]);
+}
+
+void Executor::process(const BlockWords& block, const BlockPlan& plan, bool after_motion) {
+  constexpr int kStopRank = 7;
+  for (int i = 0; i < plan.action_count; ++i) {
+    const ProcessAction& action = plan.actions[static_cast<std::size_t>(i)];
+    if ((action.rank == kStopRank) != after_motion) continue;
+    switch (action.kind) {
+      case ProcessAction::Kind::event:
+        act_on_row(block, action);
+        break;
+      case ProcessAction::Kind::comment:
+        comment_words(block, action);
+        break;
+      case ProcessAction::Kind::tcp_on:
+        set_tcp(true);
+        break;
+      case ProcessAction::Kind::tcp_off:
+        set_tcp(false);
+        break;
+      case ProcessAction::Kind::program_end:
+        sink_.program_end(block.line);
+        summary_.ended = true;
+        break;
+    }
+  }
+}
+
+void Executor::act_on_row(const BlockWords& block, const ProcessAction& action) {
+  emit_event(*action.row, block, action.piece);
+  if (m_group(action.m) == 7) {
+    modal_.spindle_row = nullptr;
+    for (const RowWord& word : action.row->words) {
+      if (word.letter == 'S' && !word.name.empty()) modal_.spindle_row = action.row;
+    }
+  }
+  if (action.m == 6) {
+    modal_.spindle_tool = modal_.words.tool;
+    summary_.tools.push_back(modal_.spindle_tool);
+  }
+}
+
+void Executor::emit_event(const EventRow& row, const BlockWords& block, std::uint32_t piece) {
+  ProcessEvent event;
+  event.name = row.event;
+  event.parameters = EventMatcher::values(row, block, modal_.words);
+  event.line = block.line;
+  event.column = reader_.place(block, piece).column;
+  sink_.event(event);
+}
+
+/// The words in the order of the block, as the user wrote them.
+void Executor::comment_words(const BlockWords& block, const ProcessAction& action) {
+  const GCode code = block.code(GGroup::non_modal);
+  const bool whole = planner_.current().whole_comment;
+  std::string text = "unmapped:";
+  const Block& span = program_.blocks[block.line - 1];
+  for (std::uint32_t i = span.first_piece; i < span.first_piece + span.piece_count; ++i) {
+    const Piece& piece = program_.pieces[i];
+    if (piece.kind != PieceKind::word) continue;
+    const bool letter = piece.letter != 'G' && piece.letter != 'M' && piece.letter != 'N' &&
+                        (action.taken & letter_bit(piece.letter)) != 0;
+    const bool shift = whole && piece.letter == 'G' && std::lround(piece.value * 10.0) == code;
+    if (i == action.piece || letter || shift) text += " " + reader_.text(i);
+  }
+  sink_.comment(text, block.line);
+  if (action.m == 6) {
+    modal_.spindle_tool = modal_.words.tool;
+    summary_.tools.push_back(modal_.spindle_tool);
+  }
+  if (m_group(action.m) == 7) modal_.spindle_row = nullptr;
+}
+
+/// The controller finds X Y Z anew from its joints when the mode changes. They keep their values
+/// when all rotary axes stand at zero, where both modes agree; otherwise they are unknown.
+void Executor::set_tcp(bool on) {
+  constexpr AxisMask kLinear = 7;
+  constexpr AxisMask kRotary = 0x38;
+  if (on == modal_.tcp) return;
+  modal_.tcp = on;
+  bool at_zero = (coordinates_.unknown() & kRotary & settings_.axes) == 0;
+  for (std::size_t i = 3; i < 6; ++i) at_zero = at_zero && coordinates_.world()[i] == 0.0;
+  if (!at_zero) coordinates_.forget(kLinear);
+}
+
+void Executor::dwell(const BlockWords& block) {
+  if (block.code(GGroup::non_modal) == 40) sink_.dwell(block['P'], block.line);
+}
+
+}  // namespace smoothpost::nc

@@ -1,0 +1,187 @@
+#include "formats/nc/executor.h"
+
+#include <utility>
+
+#include "kernels/core/units.h"
+
+namespace smoothpost::nc {
+
+Executor::Executor(const Program& program, const InterpreterSettings& settings,
+                   const EventMatcher& matcher, CanonicalSink& sink)
+    : program_(program),
+      settings_(settings),
+      matcher_(matcher),
+      sink_(sink),
+      log_(program.file_name),
+      reader_(program, log_),
+      planner_(settings, matcher, reader_, log_),
+      coordinates_(settings),
+      systems_used_(kWorkSystems + 1, false) {
+  modal_.unit = settings.inch_default ? kMillimetresPerInch : 1.0;
+  first_home_.machine = second_home_.machine = settings.home;
+}
+
+Result<InterpretationSummary> Executor::run() {
+  for (std::size_t i = 0; i < program_.blocks.size(); ++i) {
+    if (skipped(i)) continue;
+    const BlockWords& words = reader_.read(i);
+    if (words.percent) {
+      summary_.ended = percent_or_words_seen_;
+    } else {
+      block(words);
+    }
+    percent_or_words_seen_ = percent_or_words_seen_ || words.percent || words.words;
+    if (summary_.ended) {
+      if (!words.percent) note_text_after_end(i + 1);
+      break;
+    }
+  }
+  if (!summary_.ended) {
+    log_.warning(
+        "NC229",
+        "the program ends without M2, M30 or a closing %: it is read to its last line, but "
+        "LinuxCNC refuses such a file",
+        {static_cast<std::uint32_t>(program_.blocks.size()), 0});
+  }
+  if (log_.has_error()) return Result<InterpretationSummary>::failure(log_.take());
+  return {std::move(summary_), log_.take()};
+}
+
+bool Executor::skipped(std::size_t index) const {
+  const Block& block = program_.blocks[index];
+  if (settings_.execute_deleted) return false;
+  for (std::uint32_t i = 0; i < block.piece_count && i < 2; ++i) {
+    if (program_.pieces[block.first_piece + i].kind == PieceKind::block_delete) return true;
+  }
+  return false;
+}
+
+void Executor::block(const BlockWords& block) {
+  if (!block.words) {
+    if (block.comment_piece != BlockWords::kNone) comment(block);
+    return;
+  }
+  if (planner_.plan(block, modal_)) {
+    act(block, planner_.current());
+  } else {
+    recover(block);
+  }
+}
+
+/// The order of execution on one line that the LinuxCNC manual gives.
+void Executor::act(const BlockWords& block, const BlockPlan& plan) {
+  if (block.comment_piece != BlockWords::kNone) comment(block);
+  set_feed_mode(block);
+  set_feed(block);
+  speed_and_tool(block, plan);
+  process(block, plan, false);
+  dwell(block);
+  set_units(block);
+  if (block.code(GGroup::length_offset) != kNoCode) tool_length(block);
+  if (block.code(GGroup::work_system) != kNoCode) work_system(block);
+  set_modes(block);
+  if (block.code(GGroup::non_modal) != kNoCode) non_modal(block, plan);
+  motion(block, plan);
+  process(block, plan, true);
+}
+
+void Executor::set_feed_mode(const BlockWords& block) {
+  const GCode mode = block.code(GGroup::feed_mode);
+  if (mode == kNoCode) return;
+  const bool inverse = mode == 930;
+  // After inverse time a new feed is required.
+  if (modal_.inverse_time && !inverse) modal_.linear_feed = modal_.angular_feed = 0.0;
+  modal_.inverse_time = inverse;
+}
+
+/// F is taken in the units that are active before this line's G20 or G21, as the controller does.
+void Executor::set_feed(const BlockWords& block) {
+  if (!block.has('F') || modal_.inverse_time) return;
+  modal_.linear_feed = block['F'] * modal_.unit / kSecondsPerMinute;
+  modal_.angular_feed = radians_from_degrees(block['F']) / kSecondsPerMinute;
+}
+
+void Executor::set_units(const BlockWords& block) {
+  const GCode code = block.code(GGroup::units);
+  if (code == kNoCode) return;
+  const double unit = code == 200 ? kMillimetresPerInch : 1.0;
+  if (unit != modal_.unit && block.has('F') && !modal_.inverse_time) {
+    log_.warning("NC227",
+                 "F stands in the block that changes the unit: the controller takes it in the old "
+                 "unit; write " +
+                     g_code_text(code) + " on a line before",
+                 at(block, 'F'));
+  }
+  modal_.unit = unit;
+}
+
+void Executor::set_modes(const BlockWords& block) {
+  const GCode plane = block.code(GGroup::plane);
+  if (plane != kNoCode) modal_.plane = plane;
+  const GCode distance = block.code(GGroup::distance);
+  if (distance != kNoCode) modal_.incremental = distance == 910;
+  const GCode arc_distance = block.code(GGroup::arc_distance);
+  if (arc_distance != kNoCode) modal_.arc_absolute = arc_distance == 901;
+}
+
+/// After a refused block: takes over what can be told from it, so that later messages are about
+/// later blocks. The result has no value any more, whatever this does.
+void Executor::recover(const BlockWords& block) {
+  set_feed_mode(block);
+  set_feed(block);
+  const GCode unit = block.code(GGroup::units);
+  if (unit == 200 || unit == 210) modal_.unit = unit == 200 ? kMillimetresPerInch : 1.0;
+  const GCode plane = block.code(GGroup::plane);
+  if (plane == 170 || plane == 180 || plane == 190) modal_.plane = plane;
+  const GCode distance = block.code(GGroup::distance);
+  if (distance != kNoCode) modal_.incremental = distance == 910;
+  const GCode arc_distance = block.code(GGroup::arc_distance);
+  if (arc_distance != kNoCode) modal_.arc_absolute = arc_distance == 901;
+  const GCode mode = block.code(GGroup::motion);
+  if (mode != kNoCode) {
+    modal_.motion = g_code_info(mode).status == GStatus::read ? mode : kRefusedMotion;
+  } else if (modal_.motion == kNoCode) {
+    modal_.motion = kRefusedMotion;
+  }
+  const AxisMask axes = axis_mask(block.letters);
+  if (axes != 0 && block.code(GGroup::non_modal) == kNoCode) {
+    coordinates_.move_to(target(block, axes), unknown_at_target(axes));
+  }
+  for (int i = 0; i < block.m_count; ++i) {
+    const int m = block.m[static_cast<std::size_t>(i)];
+    if (m == 2 || m == 30) summary_.ended = true;
+  }
+}
+
+void Executor::note_text_after_end(std::size_t index) {
+  for (std::size_t i = index; i < program_.blocks.size(); ++i) {
+    const Block& block = program_.blocks[i];
+    for (std::uint32_t k = 0; k < block.piece_count; ++k) {
+      const PieceKind kind = program_.pieces[block.first_piece + k].kind;
+      if (kind == PieceKind::percent) return;
+      if (kind != PieceKind::word && kind != PieceKind::construct) continue;
+      log_.note("NC230", "the program has ended; the lines from here on are not read",
+                {static_cast<std::uint32_t>(i) + 1, 1});
+      return;
+    }
+  }
+}
+
+void Executor::error(const char* code, std::string text, const BlockWords& block,
+                     std::uint32_t piece) {
+  log_.error(code, std::move(text), reader_.place(block, piece));
+}
+
+TextPlace Executor::at(const BlockWords& block, char letter) const {
+  return reader_.place(block, block.has(letter)
+                                  ? block.piece[static_cast<std::size_t>(letter_index(letter))]
+                                  : block.first_piece);
+}
+
+TextPlace Executor::at(const BlockWords& block, GGroup group) const {
+  return reader_.place(block, block.code(group) != kNoCode
+                                  ? block.g_piece[static_cast<std::size_t>(group)]
+                                  : block.first_piece);
+}
+
+}  // namespace smoothpost::nc

@@ -1,0 +1,36 @@
+#pragma once
+
+#include "formats/nc/codes.h"
+#include "formats/nc/event_words.h"
+#include "kernels/core/canonical_motion.h"
+
+namespace smoothpost::nc {
+
+/// Motion mode after a block whose motion was refused: its axis words are passed over without a
+/// further message until the next G0, G1, G2, G3 or G80.
+inline constexpr GCode kRefusedMotion = -2;
+
+/// The modal state of RS274NGC but for coordinates; the values are those at the start of a program.
+struct ModalState {
+  GCode motion = kNoCode;
+  GCode plane = 170;
+  bool incremental = false;
+  bool arc_absolute = false;
+  bool inverse_time = false;
+  bool tcp = false;
+  double unit = 1.0;                      ///< mm per unit of a linear word
+  double linear_feed = 0.0;               ///< mm/s
+  double angular_feed = 0.0;              ///< rad/s, for moves of rotary words only
+  ModalWords words;                       ///< S and the selected T
+  int spindle_tool = 0;                   ///< tool of the last M6; 0: none yet
+  int length_tool = 0;                    ///< tool of the active G43; 0: none
+  const EventRow* spindle_row = nullptr;  ///< event of the last M3, M4, M5 or M19 that has one
+};
+
+/// A place that G28 or G30 goes to, in machine coordinates.
+struct HomePosition {
+  AxisWords machine{};
+  AxisMask known = 0;  ///< words that the program stored with G28.1 or G30.1
+};
+
+}  // namespace smoothpost::nc

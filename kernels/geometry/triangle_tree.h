@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "kernels/core/mesh.h"
+#include "kernels/core/result.h"
+
+namespace smoothpost {
+
+/// Which part of a triangle a closest point lies on.
+enum class MeshFeature : std::uint8_t { face, edge, vertex };
+
+/// The point of a mesh that is closest to a query point.
+struct ClosestPoint {
+  Vec3 point = Vec3::Zero();     ///< mm
+  std::uint32_t triangle = 0;    ///< index into TriangleMesh::triangles
+  double signed_distance = 0.0;  ///< mm, positive on the side that `normal` points to
+  Vec3 normal =
+      Vec3::UnitZ();  ///< unit, outward: of the face, or the pseudo-normal of edge or vertex
+  MeshFeature feature = MeshFeature::face;
+  bool on_boundary = false;  ///< edge of one triangle, or a vertex of such an edge
+};
+
+/// Closest-point queries on a triangle mesh (CGAL's AABB tree).
+///
+/// The sign of the distance is that of (q − point)·normal, with the angle-weighted pseudo-normal
+/// when the closest feature is an edge (sum of its faces' normals) or a vertex (Σ angle·normal):
+/// the sign is then right everywhere outside and inside a closed, consistently wound mesh
+/// [Baerentzen2005, Signed distance computation using the angle weighted pseudonormal, Theorem 1].
+/// Beyond the boundary of an open sheet the distance is that to its edge and the sign that of the
+/// side of the edge's face. Degenerate triangles (see MeshReport) are not in the tree.
+///
+/// Copies what it needs of the mesh. Queries are const and may run from several threads.
+class TriangleTree {
+ public:
+  TriangleTree(TriangleTree&&) noexcept;
+  TriangleTree& operator=(TriangleTree&&) noexcept;
+  ~TriangleTree();
+
+  /// The mesh point closest to `query` (mm, the mesh's frame).
+  /// Among equally close points the choice is deterministic for a given `hint`.
+  /// @param hint  a triangle that may be near, such as the last answer's: makes the query faster,
+  /// and
+  ///              changes no distance
+  /// @pre query finite, hint < triangles of the mesh   @throws ContractViolation if not.
+  /// Cost: about 2 µs at 20,000 and 10 µs at 500,000 triangles, less with a near hint.
+  ClosestPoint closest(const Vec3& query) const;
+  ClosestPoint closest(const Vec3& query, std::uint32_t hint) const;
+
+  /// Bounding box of the triangles in the tree, mm.
+  const Vec3& min() const;
+  const Vec3& max() const;
+  /// Triangles in the tree.
+  std::size_t size() const;
+  /// True for a sheet: some edge belongs to one triangle only, so there is no outside.
+  bool open() const;
+  /// Volume inside the triangles, mm³; negative for a closed mesh turned inside out, without
+  /// meaning for a sheet.
+  double signed_volume() const;
+
+ private:
+  friend Result<TriangleTree> build_triangle_tree(const TriangleMesh& mesh);
+  struct Impl;
+  explicit TriangleTree(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+/// False when the library was built without CGAL (SMOOTHPOST_WITH_CGAL=OFF).
+bool triangle_tree_available();
+
+/// Builds the tree. Cost: n log n, about 0.3 s for 500,000 triangles; 250 bytes per triangle.
+/// @pre vertex indices in range, coordinates finite   @throws ContractViolation if not.
+/// @return RG101 when the library was built without CGAL, RG102 when no triangle has area.
+Result<TriangleTree> build_triangle_tree(const TriangleMesh& mesh);
+
+}  // namespace smoothpost

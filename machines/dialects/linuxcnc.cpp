@@ -1,0 +1,360 @@
+#include "machines/dialects/linuxcnc.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "formats/nc/event_words.h"
+#include "formats/nc/interpreter.h"
+#include "formats/nc/parser.h"
+#include "kernels/core/units.h"
+#include "machines/dialects/decimal.h"
+
+namespace smoothpost::linuxcnc {
+
+namespace {
+
+constexpr std::size_t kMaxCommentLength = 200;  // LinuxCNC refuses lines over 255 characters
+
+// The offsets that must be zero when joint words are run: active work offset (and its rotation), G92
+// and tool offset, all nine axes each (parameters of the RS274NGC interpreter as LinuxCNC numbers them).
+std::vector<std::string> guard_lines() {
+  std::vector<std::string> lines;
+  const auto sum = [](int first, int count) {
+    std::string text;
+    for (int i = 0; i < count; ++i)
+      text += (i ? "+ABS[#" : "ABS[#") + std::to_string(first + i) + "]";
+    return text;
+  };
+  const auto refuse = [&lines](const std::string& label, const std::string& condition,
+                               const std::string& reason) {
+    lines.push_back("o" + label + " if [" + condition + "]");
+    lines.push_back("(ABORT, smoothpost: " + reason + ")");
+    lines.push_back("o" + label + " endif");
+  };
+  refuse("101", "[" + sum(5221, 10) + "] GT 0.0000001",
+         "G54 is not zero. This program is in machine joints: clear G54 with G10 L2 P1 R0 X0 Y0 Z0 A0 B0 "
+         "C0 U0 V0 W0");
+  refuse("102", "[#5210*[" + sum(5211, 9) + "]] GT 0.0000001",
+         "a G92 or G52 offset is active. Clear it with G92.1");
+  refuse("103", "[" + sum(5401, 9) + "] GT 0.0000001",
+         "a tool length offset is active. The tool length is in this program");
+  return lines;
+}
+
+// Comments are printed in parentheses: no nesting, no control characters, bounded length.
+std::string comment_text(std::string_view text) {
+  std::string out;
+  for (const char c : text.substr(0, kMaxCommentLength)) {
+    if (c == '(') out += '[';
+    else if (c == ')') out += ']';
+    else if (static_cast<unsigned char>(c) < 0x20) out += ' ';
+    else out += c;
+  }
+  // A cut inside a UTF-8 sequence would leave half a character.
+  while (text.size() > kMaxCommentLength && !out.empty() &&
+         (static_cast<unsigned char>(out.back()) & 0xC0) == 0x80)
+    out.pop_back();
+  if (text.size() > kMaxCommentLength && !out.empty() &&
+      static_cast<unsigned char>(out.back()) >= 0xC0)
+    out.pop_back();
+  // "(MSG, ...)", "(ABORT, ...)" and their like act; a plain comment of ours never does.
+  const auto comma = out.find(',');
+  if (comma != std::string::npos && comma < 12) out.insert(0, "- ");
+  return out;
+}
+
+class Emitter {
+ public:
+  Emitter(const MachineDefinition& machine, const MachineProgram& program)
+      : machine_(machine), program_(program), printed_(machine.axes.size()) {
+    const bool inch = machine.dialect.units == "inch";
+    length_scale_ = inch ? 1.0 / kMillimetresPerInch : 1.0;
+    out_.move_lines.reserve(program.moves.size());
+    out_.text.reserve(64 * program.moves.size() + 4096);
+  }
+
+  Result<EmittedProgram> run() {
+    header();
+    std::size_t action = 0;
+    for (std::size_t i = 0; i <= program_.moves.size(); ++i) {
+      for (; action < program_.actions.size() && program_.actions[action].before == i; ++action)
+        print_action(program_.actions[action]);
+      if (i < program_.moves.size()) print_move(program_.moves[i]);
+    }
+    set_time_mode(false);
+    for (const auto& line : machine_.dialect.end) put_line(line);
+    put_line("%");
+    out_.line_count = line_;
+    if (has_error(diagnostics_)) return Result<EmittedProgram>::failure(std::move(diagnostics_));
+    return Result<EmittedProgram>(std::move(out_), std::move(diagnostics_));
+  }
+
+ private:
+  void header() {
+    put_line("%");
+    if (!program_.certified) put_line("(NOT CERTIFIED. Written with --force: read the report before you run it)");
+    for (const auto& line : program_.title) put_line("(" + comment_text(line) + ")");
+    const bool inch = machine_.dialect.units == "inch";
+    if (machine_.dialect.start.empty())
+      put_line(std::string(inch ? "G20" : "G21") + " G17 G90 G91.1 G94 G40 G49 G80 G92.1 G54");
+    for (const auto& line : machine_.dialect.start) put_line(line);
+    // Where the template does not say so itself: units, absolute, no compensation, G54, no blending.
+    put_line(std::string(inch ? "G20" : "G21") + " G90 G94 G40 G49 G80 G92.1 G54");
+    put_line(machine_.dialect.path_mode == "exact" ? "G61" : "G64 P0.001 Q0");
+    if (machine_.dialect.offset_guard)
+      for (const auto& line : guard_lines()) put_line(line);
+    if (!program_.certified) put_line("M0");
+  }
+
+  void put_line(std::string_view line) {
+    out_.text += line;
+    out_.text += '\n';
+    ++line_;
+  }
+
+  void number(std::uint32_t input_line) {
+    if (!machine_.dialect.line_numbers || input_line == 0) return;
+    out_.text += 'N';
+    append_decimal(out_.text, input_line, 0);
+    out_.text += ' ';
+  }
+
+  void set_time_mode(bool inverse) {
+    if (inverse == inverse_time_) return;
+    put_line(inverse ? "G93" : "G94");
+    inverse_time_ = inverse;
+  }
+
+  void print_action(const MachineAction& action) {
+    switch (action.kind) {
+      case MachineAction::Kind::comment:
+        put_line("(" + comment_text(action.text) + ")");
+        return;
+      case MachineAction::Kind::dwell: {
+        number(action.input_line);
+        out_.text += "G4 P";
+        append_decimal(out_.text, action.seconds, 4);
+        put_line("");
+        return;
+      }
+      case MachineAction::Kind::event:
+        print_event(action);
+        return;
+    }
+  }
+
+  void print_event(const MachineAction& action) {
+    const auto row = std::find_if(machine_.process.events.begin(), machine_.process.events.end(),
+                                  [&](const EventWords& e) { return e.event == action.event.name; });
+    if (row == machine_.process.events.end()) return unmapped(action);
+    const auto text = nc::render_event(*row, action.event.parameters);
+    if (!text.ok()) {
+      for (auto d : text.diagnostics()) {
+        d.where.line = static_cast<int>(action.input_line);
+        diagnostics_.push_back(std::move(d));
+      }
+      return;
+    }
+    number(action.input_line);
+    put_line(text.value());
+    if (row->dwell > 0.0) {
+      out_.text += "G4 P";
+      append_decimal(out_.text, row->dwell, 4);
+      put_line("");
+    }
+  }
+
+  void unmapped(const MachineAction& action) {
+    if (machine_.process.unmapped == UnmappedWords::comment) {
+      put_line("(" + comment_text("unmapped event: " + action.event.name) + ")");
+      return;
+    }
+    Diagnostic d;
+    d.code = "PR201";
+    d.where.line = static_cast<int>(action.input_line);
+    d.where.column = static_cast<int>(action.event.column);
+    std::string values;
+    for (const auto& [key, value] : action.event.parameters) values += " " + key + "=" + value;
+    d.text = "event " + action.event.name + values + " has no words on machine " + machine_.name +
+             ": its [process.events] has no row " + action.event.name +
+             ". Add the row if the machine can do it, choose another machine, or set "
+             "process.unmapped = \"comment\" to keep it as a comment";
+    diagnostics_.push_back(std::move(d));
+  }
+
+  void print_move(const MachineMove& move) {
+    std::string words;
+    for (int j = 0; j < machine_.size(); ++j)
+      if (move.joints >> j & 1U) axis_word(words, j, move.to[j]);
+    // A block without a change is still a block: its line stands for a part of the input.
+    if (words.empty())
+      for (int j = machine_.size(); j-- > 0;)
+        if (move.joints >> j & 1U) words = " " + printed_[static_cast<std::size_t>(j)];
+    set_time_mode(!move.rapid);
+    number(move.input_line);
+    if (move.machine_coordinates) out_.text += "G53 ";
+    if (move.rapid) out_.text += "G0";
+    else out_.text += "G1";
+    out_.text += words;
+    if (!move.rapid) {
+      out_.text += " F";
+      const double f = kSecondsPerMinute / move.duration;
+      append_decimal(out_.text, f, f < 10.0 ? 7 : f < 1000.0 ? 5 : 3);
+    }
+    put_line("");
+    out_.move_lines.push_back(line_);
+  }
+
+  // Words that would print the same digits as before are left out, except when nothing else is left.
+  void axis_word(std::string& words, int j, double value) {
+    const auto& axis = machine_.axes[static_cast<std::size_t>(j)];
+    const bool rotary = axis.joint.kind == JointKind::rotary;
+    std::string word(1, axis.letter);
+    if (rotary) append_decimal(word, degrees_from_radians(value), machine_.dialect.digits_angle);
+    else append_decimal(word, value * length_scale_, machine_.dialect.digits_length);
+    auto& last = printed_[static_cast<std::size_t>(j)];
+    if (last == word) return;
+    words += ' ';
+    words += word;
+    last = std::move(word);
+  }
+
+  const MachineDefinition& machine_;
+  const MachineProgram& program_;
+  std::vector<std::string> printed_;
+  double length_scale_ = 1.0;
+  bool inverse_time_ = false;
+  std::uint32_t line_ = 0;
+  EmittedProgram out_;
+  Diagnostics diagnostics_;
+};
+
+/// Collects what the interpreter says of joint words.
+class ReadBackSink : public CanonicalSink {
+ public:
+  explicit ReadBackSink(const MachineDefinition& machine) : machine_(machine) {
+    for (int j = 0; j < machine.size(); ++j)
+      word_[static_cast<std::size_t>(j)] =
+          static_cast<int>(kAxisLetters.find(machine.axes[static_cast<std::size_t>(j)].letter));
+  }
+
+  void motion(const CanonicalMotion& motion) override {
+    ReadBackMove move;
+    move.to.resize(machine_.size());
+    for (int j = 0; j < machine_.size(); ++j) {
+      const auto w = static_cast<std::size_t>(word_[static_cast<std::size_t>(j)]);
+      move.to[j] = motion.end[w];
+      if (!(motion.unknown_end >> w & 1U)) move.known |= 1U << j;
+    }
+    move.rapid = motion.kind == MotionKind::rapid;
+    move.beam = beam_;
+    move.duration = motion.duration;
+    move.line = motion.line;
+    if (motion.is_arc) error(motion.line, "an arc in joint words is not certified: write G1 moves");
+    result.moves.push_back(std::move(move));
+    result.last_line = motion.line;
+  }
+  void dwell(double seconds, std::uint32_t line) override { add("dwell", seconds, line); }
+  void event(const ProcessEvent& event) override {
+    if (event.name == event_name::kBeamOn || event.name == event_name::kPierce) beam_ = true;
+    if (event.name == event_name::kBeamOff) beam_ = false;
+    add(event.name, 0.0, event.line);
+  }
+  void comment(std::string_view, std::uint32_t) override {}
+  void tool_length(double length, int, std::uint32_t line) override {
+    if (length != 0.0) error(line, "tool length compensation is active in a program of joint words");
+  }
+  void work_offset(const Vec3& origin, double rotation, int system, std::uint32_t line) override {
+    if (system != 1 || origin.norm() > 0.0 || rotation != 0.0)
+      error(line, "a work offset other than a zero G54 is active in a program of joint words");
+  }
+  void program_end(std::uint32_t line) override { result.last_line = line; }
+
+  ReadBack result;
+  Diagnostics diagnostics;
+
+ private:
+  void add(std::string name, double seconds, std::uint32_t line) {
+    result.events.push_back({result.moves.size(), std::move(name), seconds, beam_, line});
+    result.last_line = line;
+  }
+  void error(std::uint32_t line, std::string text) {
+    Diagnostic d;
+    d.code = "NC301";
+    d.where.line = static_cast<int>(line);
+    d.text = std::move(text);
+    diagnostics.push_back(std::move(d));
+  }
+
+  const MachineDefinition& machine_;
+  std::array<int, kMaxJoints> word_{};
+  bool beam_ = false;
+};
+
+// Blanks the guard out of the text (same line count), so that what is left has no O-words. Returns
+// whether it was there, as a whole and unchanged.
+bool take_guard(std::string& text) {
+  std::string guard;
+  for (const auto& line : guard_lines()) guard += line + "\n";
+  const auto at = text.find("\n" + guard);
+  if (at == std::string::npos) return false;
+  for (std::size_t i = at + 1; i < at + 1 + guard.size(); ++i)
+    if (text[i] != '\n') text[i] = ' ';
+  return true;
+}
+
+// Exact path holds when the first path mode word stands before the first motion, is G61, and no other
+// path mode follows.
+bool is_exact_path(const nc::Program& program) {
+  bool exact = false;
+  for (const auto& piece : program.pieces) {
+    if (piece.kind != nc::PieceKind::word || piece.letter != 'G') continue;
+    if (piece.value == 61.0) exact = true;
+    if (piece.value == 64.0 || piece.value == 61.1) return false;
+    if ((piece.value == 0.0 || piece.value == 1.0) && !exact) return false;
+  }
+  return exact;
+}
+
+}  // namespace
+
+Result<EmittedProgram> emit(const MachineDefinition& machine, const MachineProgram& program) {
+  return Emitter(machine, program).run();
+}
+
+Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
+                           const std::string& file_name) {
+  const bool guard = take_guard(text);
+  auto parsed = nc::parse(std::move(text), file_name);
+  if (has_error(parsed.diagnostics)) return Result<ReadBack>::failure(std::move(parsed.diagnostics));
+  nc::InterpreterSettings settings;
+  settings.inch_default = machine.dialect.units == "inch";
+  settings.has_tcp = false;
+  settings.process = machine.process;
+  settings.axes = 0;
+  for (const auto& axis : machine.axes) {
+    const auto w = kAxisLetters.find(axis.letter);
+    settings.axes |= static_cast<AxisMask>(1U << w);
+    settings.home[w] = axis.joint.home;
+  }
+  ReadBackSink sink(machine);
+  const auto summary = nc::interpret(parsed.program, settings, sink);
+  Diagnostics diagnostics = summary.diagnostics();
+  for (auto& d : sink.diagnostics) {
+    d.where.file = file_name;
+    diagnostics.push_back(d);
+  }
+  if (has_error(diagnostics)) return Result<ReadBack>::failure(std::move(diagnostics));
+  sink.result.offset_guard = guard;
+  sink.result.exact_path = is_exact_path(parsed.program);
+  sink.result.line_count = static_cast<std::uint32_t>(parsed.program.blocks.size());
+  return Result<ReadBack>(std::move(sink.result), std::move(diagnostics));
+}
+
+const Dialect kDialect = {
+    "linuxcnc", "LinuxCNC 2.9, joint words (trivkins), G93, exact path",
+    "all joints linear between blocks, exact path (G61): the controller stops blending at block ends",
+    &emit, &read_back};
+
+}  // namespace smoothpost::linuxcnc

@@ -1,0 +1,175 @@
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <iostream>
+#include <iterator>
+#include <memory>
+#include <string>
+
+#include "postproc/cli/options.h"
+
+namespace {
+
+using smoothpost::cli::CommandLine;
+
+volatile std::sig_atomic_t interrupted = 0;
+void on_interrupt(int) { interrupted = 1; }
+
+enum class Bar { none, terminal, filter };
+
+struct ProgressView {
+  Bar bar = Bar::none;
+  int last = -1;
+};
+
+// Stages of a run by weight, for one number from 0 to 100.
+int percent_of(const std::string& stage, double share) {
+  const double base = stage == "verify" ? 50.0 : 0.0;
+  return static_cast<int>(base + 50.0 * share);
+}
+
+int on_progress(void* user, const char* stage, double share) {
+  auto& view = *static_cast<ProgressView*>(user);
+  const int percent = percent_of(stage, share);
+  if (percent != view.last) {
+    view.last = percent;
+    if (view.bar == Bar::filter) std::fprintf(stderr, "FILTER_PROGRESS=%d\n", percent);
+    if (view.bar == Bar::terminal) std::fprintf(stderr, "\r%3d %% %-12s", percent, stage);
+    std::fflush(stderr);
+  }
+  return interrupted ? 1 : 0;
+}
+
+Bar bar_of(const std::string& option) {
+  if (option == "bar") return Bar::terminal;
+  if (option == "filter") return Bar::filter;
+  return option == "auto" && isatty(STDERR_FILENO) ? Bar::terminal : Bar::none;
+}
+
+const char* or_null(const std::string& text) { return text.empty() ? nullptr : text.c_str(); }
+
+std::vector<const char*> pointers(const std::vector<std::string>& list) {
+  std::vector<const char*> out;
+  for (const auto& text : list) out.push_back(text.c_str());
+  return out;
+}
+
+/// The C structure of a command line; owns the pointer lists that the structure refers to.
+struct CallOptions {
+  smoothpost_options c;
+  std::vector<const char*> arguments, work_offset, input_work_offset, tool, set;
+  std::string input_bytes;
+
+  explicit CallOptions(const CommandLine& l)
+      : arguments(pointers(l.arguments)),
+        work_offset(pointers(l.work_offset)),
+        input_work_offset(pointers(l.input_work_offset)),
+        tool(pointers(l.tool)),
+        set(pointers(l.set)) {
+    smoothpost_options_init(&c, sizeof c);
+    c.command = or_null(l.command);
+    c.arguments = arguments.data();
+    c.argument_count = arguments.size();
+    c.input = or_null(l.input);
+    c.machine = or_null(l.machine);
+    c.machine_path = or_null(l.machine_path);
+    c.workpiece = or_null(l.workpiece);
+    c.workpiece_unit = or_null(l.workpiece_unit);
+    c.output = or_null(l.output);
+    c.dialect = or_null(l.dialect);
+    c.input_format = or_null(l.input_format);
+    c.input_dialect = or_null(l.input_dialect);
+    c.input_machine = or_null(l.input_machine);
+    c.process = or_null(l.process);
+    c.work_offset = work_offset.data();
+    c.work_offset_count = work_offset.size();
+    c.input_work_offset = input_work_offset.data();
+    c.input_work_offset_count = input_work_offset.size();
+    c.tool = tool.data();
+    c.tool_count = tool.size();
+    c.tip_tolerance = or_null(l.tip_tolerance);
+    c.axis_tolerance = or_null(l.axis_tolerance);
+    c.lead = or_null(l.lead);
+    c.tilt = or_null(l.tilt);
+    c.smoothing = or_null(l.smoothing);
+    c.orientation = or_null(l.orientation);
+    c.optimise = or_null(l.optimise);
+    c.schedule = or_null(l.schedule);
+    c.links = or_null(l.links);
+    c.cuts = or_null(l.cuts);
+    c.against = or_null(l.against);
+    c.json = or_null(l.json);
+    c.report = or_null(l.report);
+    c.trajectory = or_null(l.trajectory);
+    c.line_map = or_null(l.line_map);
+    c.set = set.data();
+    c.set_count = set.size();
+    c.no_collision_check = l.no_collision_check;
+    c.timings = l.timings;
+    c.force = l.force;
+    if (l.input == "-") {
+      input_bytes.assign(std::istreambuf_iterator<char>(std::cin), {});
+      c.input_data = input_bytes.data();
+      c.input_size = input_bytes.size();
+    }
+  }
+};
+
+void print_diagnostics(const smoothpost_result* result, bool json) {
+  if (json) {
+    std::cerr << smoothpost_result_diagnostics_json(result, nullptr);
+    return;
+  }
+  const size_t count = smoothpost_result_diagnostic_count(result);
+  for (size_t i = 0; i < count; ++i) {
+    smoothpost_diagnostic d;
+    d.size = sizeof d;
+    if (smoothpost_result_diagnostic(result, i, &d) == 0) std::cerr << d.formatted << '\n';
+  }
+}
+
+int finish(const CommandLine& line, const smoothpost_result* result) {
+  int status = smoothpost_result_status(result);
+  const bool json = line.diagnostics == "json";
+  print_diagnostics(result, json);
+  size_t size = 0;
+  const char* text = smoothpost_result_text(result, &size);
+  std::cout.write(text, static_cast<std::streamsize>(size));
+  const char* program = smoothpost_result_program(result, &size);
+  if (line.output == "-") std::cout.write(program, static_cast<std::streamsize>(size));
+  std::cout.flush();
+  if (!std::cout) {
+    std::cerr << "error: standard output cannot be written [US132]\n";
+    return SMOOTHPOST_USAGE;
+  }
+  const std::string summary = smoothpost_result_summary(result);
+  const std::string path = smoothpost_result_program_path(result);
+  if (!json && !summary.empty())
+    std::cerr << summary << (path.empty() ? "" : "; written to " + path) << '\n';
+  return status;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto parsed = smoothpost::cli::parse_command_line(argc, argv);
+  if (parsed.leave) return parsed.status;
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGPIPE, SIG_IGN);
+  CallOptions options(parsed.line);
+  ProgressView view;
+  view.bar = bar_of(parsed.line.progress);
+  options.c.progress = on_progress;
+  options.c.progress_user = &view;
+  smoothpost_result* raw = nullptr;
+  const int status = smoothpost_run(&options.c, &raw);
+  if (view.bar == Bar::terminal && view.last >= 0) std::fprintf(stderr, "\r%*s\r", 24, "");
+  if (!raw) {
+    std::cerr << "error: internal error: out of memory [IN102]\n";
+    return status;
+  }
+  const std::unique_ptr<smoothpost_result, void (*)(smoothpost_result*)> result(
+      raw, smoothpost_result_destroy);
+  return finish(parsed.line, result.get());
+}

@@ -1,0 +1,124 @@
+#include "postproc/cli/options.h"
+
+#include <CLI/CLI.hpp>
+
+namespace smoothpost::cli {
+
+namespace {
+
+constexpr const char* kExample =
+    "Example: a program posted for an A/C table machine, for a B/C table machine:\n"
+    "  smoothpost convert part.ngc --input-machine table_table_ac -m table_table_bc --tool 1=60 "
+    "-o out.ngc --json out.json\n"
+    "A 3D laser program with its part, placed on the machine, certified with its gap:\n"
+    "  smoothpost convert sheet.ngc --input-machine laser_5p1 -m laser_5p1 -w sheet.stl "
+    "--work-offset G54=700,600,1000 -o out.ngc\n";
+
+void add_machine_options(CLI::App* app, CommandLine& l) {
+  app->add_option("-m,--machine", l.machine, "the machine: a name or a machine.toml");
+  app->add_option("--machine-path", l.machine_path, "folders of machines, separated by ':'");
+  app->add_option("--set", l.set, "section.key=value of the machine file, repeatable")
+      ->take_all()
+      ->allow_extra_args(false);
+}
+
+void add_output_options(CLI::App* app, CommandLine& l) {
+  app->add_option("--json", l.json, "write the JSON report to FILE");
+  app->add_option("--report", l.report, "write the report page to FILE (a later version)");
+  app->add_option("--diagnostics", l.diagnostics, "text | json")
+      ->check(CLI::IsMember({"text", "json"}));
+  app->add_option("--progress", l.progress, "auto | bar | filter | none")
+      ->check(CLI::IsMember({"auto", "bar", "filter", "none"}));
+  app->add_flag("--timings", l.timings, "put the seconds of each stage into the report");
+}
+
+void add_part_options(CLI::App* app, CommandLine& l) {
+  app->add_option("-w,--workpiece", l.workpiece, "the part: an STL in the program's coordinates");
+  app->add_option("--workpiece-unit", l.workpiece_unit, "unit of the STL: mm | inch");
+  app->add_option("--work-offset", l.work_offset,
+                  "G54=x,y,z[,a,b,c]: the program's zero on the output machine, mm and deg")
+      ->take_all()
+      ->allow_extra_args(false);
+}
+
+void add_convert(CLI::App& app, CommandLine& l) {
+  auto* c = app.add_subcommand("convert", "a CAM program to a certified machine program");
+  c->footer(kExample);
+  c->add_option("input", l.input, "NC program or CSV; - for standard input")->required();
+  add_machine_options(c, l);
+  c->add_option("-o,--output", l.output, "the program; - for standard output");
+  add_part_options(c, l);
+  c->add_option("--dialect", l.dialect, "output dialect instead of the machine's");
+  c->add_option("--input-format", l.input_format, "nc | csv");
+  c->add_option("--input-dialect", l.input_dialect, "linuxcnc");
+  c->add_option("--input-machine", l.input_machine,
+                "the machine that the input was posted for; needed for rotary words");
+  c->add_option("--process", l.process, "TOML with [process.events] in place of the input machine's");
+  c->add_option("--input-work-offset", l.input_work_offset,
+                "G54=x,y,z[,a,b,c]: the program's zero on the input machine")
+      ->take_all()
+      ->allow_extra_args(false);
+  c->add_option("--tool", l.tool, "N=length in mm, repeatable")->take_all()->allow_extra_args(false);
+  c->add_option("--tip-tolerance", l.tip_tolerance, "mm");
+  c->add_option("--axis-tolerance", l.axis_tolerance, "deg");
+  c->add_option("--lead", l.lead, "freedom of the tool axis, deg");
+  c->add_option("--tilt", l.tilt, "freedom of the tool axis, deg");
+  c->add_option("--smoothing", l.smoothing, "none");
+  c->add_option("--orientation", l.orientation, "programmed");
+  c->add_option("--optimise", l.optimise, "none");
+  c->add_option("--schedule", l.schedule, "programmed");
+  c->add_option("--links", l.links, "keep");
+  c->add_option("--cuts", l.cuts, "a later version");
+  c->add_option("--trajectory", l.trajectory, "write joint samples at the machine's cycle to FILE.csv");
+  c->add_option("--line-map", l.line_map, "write output line -> input line to FILE.json");
+  c->add_flag("--no-collision-check", l.no_collision_check, "this version makes none");
+  c->add_flag("--force", l.force, "write a refused program too, marked NOT CERTIFIED");
+  add_output_options(c, l);
+}
+
+void add_check(CLI::App& app, CommandLine& l) {
+  auto* c = app.add_subcommand("check", "certify limits of an existing machine program");
+  c->add_option("program", l.input, "the program; - for standard input")->required();
+  add_machine_options(c, l);
+  add_part_options(c, l);
+  c->add_option("--against", l.against, "a later version");
+  add_output_options(c, l);
+}
+
+void add_words(CLI::App& app, CommandLine& l, const char* name, const char* help) {
+  auto* c = app.add_subcommand(name, help);
+  c->add_option("words", l.arguments, "what to do");
+  c->add_option("--machine-path", l.machine_path, "folders of machines, separated by ':'");
+  c->add_option("--set", l.set, "section.key=value of the machine file, repeatable")
+      ->take_all()
+      ->allow_extra_args(false);
+  c->add_option("--diagnostics", l.diagnostics, "text | json")
+      ->check(CLI::IsMember({"text", "json"}));
+}
+
+}  // namespace
+
+Parsed parse_command_line(int argc, char** argv) {
+  Parsed parsed;
+  CommandLine& l = parsed.line;
+  CLI::App app("smoothpost: CAM programs to certified machine programs", "smoothpost");
+  app.footer(kExample);
+  app.set_version_flag("--version", std::string("smoothpost ") + smoothpost_version());
+  app.require_subcommand(1);
+  add_convert(app, l);
+  add_check(app, l);
+  add_words(app, l, "machines", "list | show NAME | validate FILE");
+  add_words(app, l, "formats", "input formats and output dialects");
+  add_words(app, l, "golden", "run DIR | update DIR: sample programs as regression cases");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    parsed.leave = true;
+    parsed.status = app.exit(e) == 0 ? 0 : static_cast<int>(SMOOTHPOST_USAGE);
+    return parsed;
+  }
+  l.command = app.get_subcommands().front()->get_name();
+  return parsed;
+}
+
+}  // namespace smoothpost::cli

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "smoothpost/smoothpost.h"
+
+namespace smoothpost::cli {
+
+/// The command line as text, under the names of the C structure.
+struct CommandLine {
+  std::string command;
+  std::vector<std::string> arguments;
+  std::string input, machine, machine_path, workpiece, workpiece_unit, output, dialect, input_format,
+      input_dialect, input_machine, process, tip_tolerance, axis_tolerance, lead, tilt, smoothing,
+      orientation, optimise, schedule, links, cuts, against, json, report, trajectory, line_map;
+  std::vector<std::string> work_offset, input_work_offset, tool, set;
+  bool no_collision_check = false;
+  bool timings = false;
+  bool force = false;
+  std::string progress = "auto";
+  std::string diagnostics = "text";
+};
+
+/// What parsing ended with: go on, or leave with `status` (help, version, a usage error: printed).
+struct Parsed {
+  CommandLine line;
+  bool leave = false;
+  int status = 0;
+};
+
+Parsed parse_command_line(int argc, char** argv);
+
+}  // namespace smoothpost::cli

@@ -1,0 +1,440 @@
+#include "postproc/jobs/job.h"
+
+#include <algorithm>
+#include <exception>
+#include <filesystem>
+
+#include "formats/mesh/stl_reader.h"
+#include "kernels/core/contract.h"
+#include "kernels/core/units.h"
+#include "kernels/geometry/weld.h"
+#include "machines/dialects/decimal.h"
+#include "postproc/jobs/files.h"
+#include "postproc/jobs/golden.h"
+#include "postproc/jobs/machine_commands.h"
+#include "postproc/jobs/settings.h"
+#include "postproc/pipeline/convert.h"
+#include "postproc/pipeline/hash.h"
+#include "postproc/pipeline/registry.h"
+#include "postproc/pipeline/trajectory.h"
+#include "postproc/report/report_json.h"
+
+namespace smoothpost {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string base_name(const std::string& path) { return fs::path(path).filename().string(); }
+
+std::string decimal(double value, int digits) {
+  std::string text;
+  append_decimal(text, value, digits);
+  return text;
+}
+
+/// One run of convert or check: reads the options, runs the pipeline, writes the files.
+class Run {
+ public:
+  Run(const Options& options, const Progress& progress) : options_(options), progress_(progress) {}
+
+  JobResult convert_command() {
+    if (!refuse_later_options() || !load_output_machine() || !load_input()) return finish();
+    ConvertInput in;
+    if (!read_program(in) || !place(in) || !read_part(in.part, in.part_name)) return finish();
+    in.machine = machine_.definition;
+    in.input_name = input_name_;
+    in.title = title(in);
+    const Conversion conversion = convert(in, options_.force, progress_);
+    const ScrewChain chain = placed(in.placement);
+    const double tool_length = in.input.path.points.front().tool_length;
+    context_.cutter_locations = in.input.path.points.size();
+    context_.input_lines = in.input.lines;
+    report(conversion);
+    if (!options_.trajectory.empty() && !conversion.read.moves.empty())
+      result_.trajectory = trajectory_csv(conversion.read, machine_.definition, chain, tool_length);
+    result_.line_map = line_map_json(conversion.line_map, base_name(input_name_));
+    if (conversion.verdict == Verdict::certified || conversion.verdict == Verdict::forced)
+      result_.program = conversion.program;
+    return finish();
+  }
+
+  JobResult check_command() {
+    if (!options_.against.empty()) {
+      add(usage_error("US122", "--against is not possible in this version: `convert` compares its own output "
+                               "with its input"));
+      return finish();
+    }
+    if (!refuse_later_options() || !load_output_machine() || !load_input()) return finish();
+    CheckInput in;
+    std::optional<Pose> placement = read_placement(std::nullopt);
+    if (!placement || !read_part(in.part, in.part_name)) return finish();
+    in.placement = *placement;
+    in.text = std::move(input_bytes_);
+    in.file_name = input_name_;
+    in.machine = machine_.definition;
+    context_.input_lines = static_cast<std::size_t>(std::count(in.text.begin(), in.text.end(), '\n'));
+    context_.program_sha256 = context_.input_sha256;
+    report(check_program(in, progress_));
+    return finish();
+  }
+
+ private:
+  void add(Diagnostic d) { result_.diagnostics.push_back(std::move(d)); }
+  void add(const Diagnostics& list) {
+    result_.diagnostics.insert(result_.diagnostics.end(), list.begin(), list.end());
+  }
+
+  // What this version cannot do is refused by name, so that nobody takes silence for a yes.
+  bool refuse_later_options() {
+    const auto refuse = [this](const std::string& value, const char* option) {
+      if (!value.empty())
+        add(usage_error("US122", std::string(option) + " is not possible in this version"));
+    };
+    refuse(options_.report, "--report");
+    refuse(options_.cuts, "--cuts");
+    if (options_.links == "plan" || (!options_.links.empty() && options_.links != "keep"))
+      add(usage_error("US122", "--links " + options_.links + " is not possible in this version: links are kept "
+                               "as programmed (--links keep)"));
+    if (!options_.input_dialect.empty() && options_.input_dialect != "linuxcnc")
+      add(usage_error("US122", "--input-dialect " + options_.input_dialect +
+                                   " is not read in this version; possible: linuxcnc"));
+    return !has_error(result_.diagnostics);
+  }
+
+  bool load_output_machine() {
+    if (options_.machine.empty()) {
+      add(usage_error("US101", "no machine: say -m MACHINE (`smoothpost machines list` shows them)"));
+      return false;
+    }
+    const auto overrides = overrides_of(options_);
+    add(overrides.diagnostics());
+    if (!overrides.ok()) return false;
+    auto machine = load_machine(options_.machine, options_, overrides.value());
+    add(machine.diagnostics());
+    if (!machine.ok()) return false;
+    machine_ = std::move(machine.value());
+    context_.machine = machine_.definition.name;
+    context_.dialect = machine_.definition.dialect.name;
+    std::string with_overrides = machine_.text;
+    for (const auto& o : overrides.value()) with_overrides += "\n# --set " + o.key + "=" + o.value;
+    context_.machine_sha256 = sha256(with_overrides);
+    return true;
+  }
+
+  bool load_input() {
+    if (options_.input.empty()) {
+      add(usage_error("US102", "no input file"));
+      return false;
+    }
+    input_name_ = options_.input == "-" ? "<stdin>" : options_.input;
+    if (options_.input_data) {
+      input_bytes_ = *options_.input_data;
+    } else {
+      auto bytes = read_file(options_.input);
+      add(bytes.diagnostics());
+      if (!bytes.ok()) {
+        unreadable_ = true;
+        return false;
+      }
+      input_bytes_ = std::move(bytes.value());
+    }
+    context_.input_file = base_name(input_name_);
+    context_.input_sha256 = sha256(input_bytes_);
+    context_.version = kVersion;
+    context_.timings = options_.timings;
+    return true;
+  }
+
+  bool read_program(ConvertInput& in) {
+    const InputFormat* format = options_.input_format.empty()
+                                    ? format_by_extension(options_.input)
+                                    : find_input_format(options_.input_format);
+    if (!format) {
+      add(usage_error("US103", options_.input_format.empty()
+                                   ? "the format of " + input_name_ +
+                                         " cannot be told from its name: say --input-format nc|csv"
+                                   : "--input-format " + options_.input_format +
+                                         " is not read in this version; possible: csv, nc"));
+      return false;
+    }
+    context_.input_format = format->name;
+    context_.input_dialect = format->has_words ? "linuxcnc" : "";
+    InputSettings settings;
+    settings.file_name = input_name_;
+    if (!input_settings(settings)) return false;
+    auto read = format->read(std::move(input_bytes_), settings);
+    add(read.diagnostics());
+    if (!read.ok()) return false;
+    in.input = std::move(read.value());
+    return true;
+  }
+
+  bool input_settings(InputSettings& settings) {
+    if (!options_.input_machine.empty()) {
+      auto machine = load_machine(options_.input_machine, options_, {});
+      add(machine.diagnostics());
+      if (!machine.ok()) return false;
+      settings.machine = std::move(machine.value().definition);
+    }
+    if (!options_.process.empty()) {
+      const auto bytes = read_file(options_.process, std::size_t{16} << 20);
+      add(bytes.diagnostics());
+      if (!bytes.ok()) return false;
+      auto process = parse_process_file(bytes.value(), options_.process);
+      add(process.diagnostics());
+      if (!process.ok()) return false;
+      settings.process = std::move(process.value());
+    }
+    auto tools = read_tools(options_.tool);
+    const auto offsets = read_offsets(options_.input_work_offset, "--input-work-offset");
+    add(tools.diagnostics());
+    add(offsets.diagnostics());
+    if (!tools.ok() || !offsets.ok()) return false;
+    settings.tool_lengths = std::move(tools.value());
+    for (const auto& offset : offsets.value()) {
+      nc::WorkOffset words;
+      for (int i = 0; i < 3; ++i) {
+        words.words[static_cast<std::size_t>(i)] = offset.position[i];
+        words.words[static_cast<std::size_t>(i) + 3] = offset.turn[i];
+      }
+      settings.work_offsets[offset.system] = words;
+    }
+    return true;
+  }
+
+  static std::string system_name(int system) {
+    return system <= 6 ? "G" + std::to_string(53 + system) : "G59." + std::to_string(system - 6);
+  }
+
+  // Where the program's zero lies on the output machine. `system`: the one that the program uses.
+  std::optional<Pose> read_placement(std::optional<int> system) {
+    if (options_.work_offset.size() == 1 && options_.work_offset.front() == "auto") {
+      add(usage_error("US122", "--work-offset auto is not possible in this version: give G54=x,y,z"));
+      return {};
+    }
+    const auto offsets = read_offsets(options_.work_offset, "--work-offset");
+    add(offsets.diagnostics());
+    if (!offsets.ok()) return {};
+    Pose placement = Pose::Identity();
+    if (offsets.value().empty()) {
+      placement_text_ = "the program's zero lies at the zero of the machine's workpiece frame (no --work-offset)";
+      return placement;
+    }
+    if (offsets.value().size() > 1 || (system && offsets.value().front().system != *system)) {
+      add(usage_error("US144", "--work-offset places the program's zero, which is that of " +
+                                   system_name(system.value_or(1)) +
+                                   " here: give exactly that one (others follow by --input-work-offset)"));
+      return {};
+    }
+    const OffsetOption& o = offsets.value().front();
+    placement.translation() = o.position;
+    placement.linear() = rotation_from_rpy(o.turn.x(), o.turn.y(), o.turn.z());
+    placement_text_ = "the program's zero lies at " + decimal(o.position.x(), 4) + ", " +
+                      decimal(o.position.y(), 4) + ", " + decimal(o.position.z(), 4) +
+                      " mm in the machine's workpiece frame";
+    if (o.turn.norm() > 0.0)
+      placement_text_ += ", turned by " + decimal(degrees_from_radians(o.turn.x()), 4) + ", " +
+                         decimal(degrees_from_radians(o.turn.y()), 4) + ", " +
+                         decimal(degrees_from_radians(o.turn.z()), 4) + " deg about X, Y, Z";
+    return placement;
+  }
+
+  bool place(ConvertInput& in) {
+    const bool words = context_.input_format == "nc";
+    const auto placement = read_placement(words ? std::optional<int>(in.input.system) : std::nullopt);
+    if (!placement) return false;
+    in.placement = *placement;
+    in.placement_text = placement_text_;
+    return true;
+  }
+
+  bool read_part(std::optional<TriangleMesh>& part, std::string& part_name) {
+    if (options_.workpiece.empty() && !options_.workpiece_data) return true;
+    part_name = options_.workpiece.empty() ? "<workpiece>" : options_.workpiece;
+    std::string bytes;
+    if (options_.workpiece_data) {
+      bytes = *options_.workpiece_data;
+    } else {
+      auto read = read_file(options_.workpiece);
+      add(read.diagnostics());
+      if (!read.ok()) {
+        unreadable_ = true;
+        return false;
+      }
+      bytes = std::move(read.value());
+    }
+    StlSettings settings;
+    if (options_.workpiece_unit == "inch") {
+      settings.scale = kMillimetresPerInch;
+    } else if (!options_.workpiece_unit.empty() && options_.workpiece_unit != "mm") {
+      add(usage_error("US145", "--workpiece-unit " + options_.workpiece_unit + ": expected is mm or inch"));
+      return false;
+    }
+    const auto stl = read_stl(bytes, part_name, settings);
+    add(stl.diagnostics());
+    if (!stl.ok()) return false;
+    part = weld(stl.value().corners);
+    add(mesh_findings(describe(*part), part_name));
+    return true;
+  }
+
+  ScrewChain placed(const Pose& placement) const {
+    ScrewChain chain = chain_of(machine_.definition);
+    chain.workpiece_home = chain.workpiece_home * placement;
+    return chain;
+  }
+
+  std::vector<std::string> title(const ConvertInput& in) const {
+    std::vector<std::string> lines;
+    lines.push_back(std::string("smoothpost ") + kVersion + " for machine " + machine_.definition.name);
+    lines.push_back("input " + base_name(input_name_) + " sha256 " + context_.input_sha256);
+    lines.push_back("machine joints. " + in.placement_text);
+    std::map<int, double> tools;
+    for (const auto& p : in.input.path.points)
+      if (p.tool > 0) tools[p.tool] = p.tool_length;
+    for (const auto& [tool, length] : tools)
+      lines.push_back("tool " + std::to_string(tool) + ": length " + decimal(length, 4) +
+                      " mm is in the joint values");
+    return lines;
+  }
+
+  void report(const Conversion& conversion) {
+    add(conversion.diagnostics);
+    if (!conversion.program.empty()) context_.program_sha256 = sha256(conversion.program);
+    Conversion told = conversion;
+    told.diagnostics = result_.diagnostics;
+    result_.report = report_json(told, context_);
+    result_.verdict = to_string(conversion.verdict);
+    verdict_ = conversion.verdict;
+    summary(conversion);
+  }
+
+  void summary(const Conversion& conversion) {
+    std::size_t failed = 0;
+    const Check* tip = nullptr;
+    const Check* axis = nullptr;
+    for (const auto& c : conversion.checks) {
+      if (!c.ok) ++failed;
+      if (c.name == "tip_deviation") tip = &c;
+      if (c.name == "axis_deviation") axis = &c;
+    }
+    std::string text = result_.verdict + " (level " + conversion.level + "): " +
+                       std::to_string(conversion.checks.size()) + " checks, " + std::to_string(failed) +
+                       " failed";
+    if (tip && axis)
+      text += "; tip " + decimal(tip->value, 5) + " of " + decimal(tip->limit, 5) + " mm, axis " +
+              decimal(axis->value, 5) + " of " + decimal(axis->limit, 5) + " deg";
+    if (conversion.blocks > 0)
+      text += "; " + std::to_string(conversion.blocks) + " blocks, " +
+              decimal(conversion.scheduled_time, 1) + " s planned";
+    text += "; not checked:";
+    for (const auto& name : conversion.not_checked) text += " " + name + ",";
+    text.pop_back();
+    result_.summary = text;
+  }
+
+  /// Without a conversion there is still a report that says why.
+  void report_failure() {
+    Conversion none;
+    none.diagnostics = result_.diagnostics;
+    result_.report = report_json(none, context_);
+    result_.verdict = to_string(Verdict::refused);
+    verdict_ = Verdict::refused;
+  }
+
+  JobResult finish() {
+    context_.version = kVersion;
+    if (!verdict_) report_failure();
+    result_.status = status_of(result_.diagnostics);
+    if (unreadable_) result_.status = ExitStatus::unreadable;
+    if (verdict_ == Verdict::forced) result_.status = ExitStatus::refused;
+    write_files();
+    return std::move(result_);
+  }
+
+  void write_files() {
+    const auto write = [this](const std::string& path, const std::string& bytes) {
+      if (path.empty() || path == "-" || bytes.empty()) return;
+      const Diagnostics errors = write_file(path, bytes);
+      add(errors);
+      if (has_error(errors)) result_.status = ExitStatus::usage;
+    };
+    write(options_.json, result_.report);
+    write(options_.line_map, result_.line_map);
+    write(options_.trajectory, result_.trajectory);
+    if (result_.program.empty() || options_.output == "-") return;
+    result_.program_path = options_.output.empty() ? default_output() : options_.output;
+    write(result_.program_path, result_.program);
+  }
+
+  // The input's stem in the working directory with the dialect's extension, never the input itself.
+  std::string default_output() const {
+    const fs::path stem = options_.input == "-" ? fs::path("stdin") : fs::path(options_.input).stem();
+    const std::string extension = "." + machine_.definition.dialect.extension;
+    const fs::path wanted = stem.string() + extension;
+    std::error_code error;
+    if (fs::equivalent(wanted, options_.input, error))
+      return stem.string() + "_smoothpost" + extension;
+    return wanted.string();
+  }
+
+  const Options& options_;
+  const Progress& progress_;
+  JobResult result_;
+  LoadedMachine machine_;
+  std::string input_name_;
+  std::string input_bytes_;
+  std::string placement_text_;
+  ReportContext context_;
+  std::optional<Verdict> verdict_;
+  bool unreadable_ = false;
+};
+
+JobResult dispatch(const Options& options, const Progress& progress) {
+  if (options.command == "convert") return Run(options, progress).convert_command();
+  if (options.command == "check") return Run(options, progress).check_command();
+  if (options.command == "machines") return run_machines_command(options);
+  if (options.command == "formats") return run_formats_command(options);
+  if (options.command == "golden") return run_golden_command(options, progress);
+  JobResult result;
+  result.status = ExitStatus::usage;
+  result.diagnostics.push_back(usage_error(
+      "US100", "unknown command \"" + options.command + "\": convert, check, machines, formats or golden"));
+  return result;
+}
+
+}  // namespace
+
+ExitStatus status_of(const Diagnostics& diagnostics) {
+  bool internal = false, usage = false, unreadable = false, refused = false;
+  for (const auto& d : diagnostics) {
+    if (d.severity != Severity::error) continue;
+    const std::string family = d.code.substr(0, d.code.find_first_of("0123456789"));
+    if (family == "IN") internal = true;
+    else if (family == "US") usage = true;
+    else if (family == "NC" || family == "CSV" || family == "STL" || family == "MF") unreadable = true;
+    else refused = true;
+  }
+  if (internal) return ExitStatus::internal;
+  if (usage) return ExitStatus::usage;
+  if (unreadable) return ExitStatus::unreadable;
+  if (refused) return ExitStatus::refused;
+  return ExitStatus::certified;
+}
+
+JobResult run_job(const Options& options, const Progress& progress) {
+  try {
+    return dispatch(options, progress);
+  } catch (const std::exception& e) {
+    JobResult result;
+    result.status = ExitStatus::internal;
+    Diagnostic d;
+    d.code = "IN101";
+    d.text = std::string("internal error, please report it: ") + e.what();
+    result.diagnostics.push_back(std::move(d));
+    return result;
+  }
+}
+
+}  // namespace smoothpost

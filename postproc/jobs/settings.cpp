@@ -1,0 +1,188 @@
+#include "postproc/jobs/settings.h"
+
+#include <dlfcn.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+
+#include "kernels/core/units.h"
+#include "postproc/jobs/files.h"
+
+namespace smoothpost {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::vector<std::string> split(std::string_view text, char separator) {
+  std::vector<std::string> parts;
+  while (true) {
+    const auto at = text.find(separator);
+    parts.emplace_back(text.substr(0, at));
+    if (at == std::string_view::npos) return parts;
+    text.remove_prefix(at + 1);
+  }
+}
+
+// The folder of the library or program that holds this code.
+fs::path own_folder() {
+  Dl_info info{};
+  if (::dladdr(reinterpret_cast<const void*>(&machine_folders), &info) == 0 || !info.dli_fname)
+    return {};
+  std::error_code error;
+  const fs::path path = fs::canonical(info.dli_fname, error);
+  return error ? fs::path{} : path.parent_path();
+}
+
+}  // namespace
+
+Diagnostic usage_error(const char* code, std::string text) {
+  Diagnostic d;
+  d.code = code;
+  d.text = std::move(text);
+  return d;
+}
+
+std::optional<double> read_number(std::string_view text) {
+  while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
+  while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
+  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return {};
+  return value;
+}
+
+std::vector<std::string> machine_folders(const Options& options) {
+  std::vector<std::string> folders;
+  if (!options.machine_path.empty()) folders = split(options.machine_path, ':');
+  if (const char* variable = std::getenv("SMOOTHPOST_MACHINES"))
+    for (auto& folder : split(variable, ':'))
+      if (!folder.empty()) folders.push_back(folder);
+  const fs::path own = own_folder();
+  if (!own.empty()) {
+    // <prefix>/lib[/arch], <prefix>/bin -> <prefix>/share; build/<preset>/lib -> the source tree.
+    for (const char* way : {"../share/smoothpost/machines", "../../share/smoothpost/machines",
+                            "../../../machines"}) {
+      std::error_code error;
+      const fs::path folder = fs::canonical(own / way, error);
+      if (!error && fs::is_directory(folder, error)) folders.push_back(folder.string());
+    }
+  }
+  return folders;
+}
+
+Result<LoadedMachine> load_machine(const std::string& name_or_file, const Options& options,
+                                   const std::vector<MachineOverride>& overrides) {
+  std::string path;
+  std::error_code error;
+  if (name_or_file.find('/') != std::string::npos || name_or_file.ends_with(".toml")) {
+    path = name_or_file;
+  } else {
+    for (const auto& folder : machine_folders(options)) {
+      const fs::path candidate = fs::path(folder) / name_or_file / "machine.toml";
+      if (fs::exists(candidate, error)) {
+        path = candidate.string();
+        break;
+      }
+    }
+  }
+  if (path.empty()) {
+    std::string where;
+    for (const auto& folder : machine_folders(options)) where += (where.empty() ? "" : ", ") + folder;
+    return Result<LoadedMachine>::failure(
+        usage_error("US140", "no machine named \"" + name_or_file + "\" in " +
+                                 (where.empty() ? "any folder" : where) +
+                                 ": `smoothpost machines list` shows what there is"));
+  }
+  auto bytes = read_file(path, std::size_t{16} << 20);
+  if (!bytes.ok()) return Result<LoadedMachine>::failure(bytes.diagnostics());
+  auto machine = parse_machine_file(bytes.value(), path, overrides);
+  if (!machine.ok()) return Result<LoadedMachine>::failure(machine.diagnostics());
+  return Result<LoadedMachine>({std::move(machine.value()), path, std::move(bytes.value())},
+                               machine.diagnostics());
+}
+
+Result<std::vector<MachineOverride>> overrides_of(const Options& options) {
+  std::vector<MachineOverride> overrides;
+  Diagnostics errors;
+  const auto add = [&overrides](const char* key, const std::string& value) {
+    if (!value.empty()) overrides.push_back({key, value});
+  };
+  add("tolerance.tip_mm", options.tip_tolerance);
+  add("tolerance.axis_deg", options.axis_tolerance);
+  add("tolerance.lead_deg", options.lead);
+  add("tolerance.tilt_deg", options.tilt);
+  add("recipe.smoothing", options.smoothing);
+  add("recipe.orientation", options.orientation);
+  add("recipe.optimise", options.optimise);
+  add("recipe.schedule", options.schedule);
+  add("dialect.name", options.dialect);
+  for (const auto& entry : options.set) {
+    const auto at = entry.find('=');
+    if (at == std::string::npos || at == 0)
+      errors.push_back(usage_error("US141", "--set " + entry + ": section.key=value is expected"));
+    else
+      overrides.push_back({entry.substr(0, at), entry.substr(at + 1)});
+  }
+  if (!errors.empty()) return Result<std::vector<MachineOverride>>::failure(std::move(errors));
+  return overrides;
+}
+
+Result<std::vector<OffsetOption>> read_offsets(const std::vector<std::string>& texts,
+                                               const std::string& option) {
+  static const std::vector<std::string> kSystems = {"G54", "G55", "G56", "G57", "G58",
+                                                    "G59", "G59.1", "G59.2", "G59.3"};
+  std::vector<OffsetOption> offsets;
+  Diagnostics errors;
+  for (const auto& text : texts) {
+    const auto at = text.find('=');
+    const auto system = std::find(kSystems.begin(), kSystems.end(), text.substr(0, at));
+    std::vector<double> numbers;
+    bool good = at != std::string::npos && system != kSystems.end();
+    if (good)
+      for (const auto& part : split(std::string_view(text).substr(at + 1), ',')) {
+        const auto value = read_number(part);
+        if (value) numbers.push_back(*value);
+        else good = false;
+      }
+    if (!good || (numbers.size() != 3 && numbers.size() != 6)) {
+      errors.push_back(usage_error("US142", option + " " + text +
+                                                ": expected is G54=x,y,z or G54=x,y,z,a,b,c (G54 to "
+                                                "G59.3, mm and degrees)"));
+      continue;
+    }
+    OffsetOption offset;
+    offset.system = static_cast<int>(system - kSystems.begin()) + 1;
+    offset.position = Vec3(numbers[0], numbers[1], numbers[2]);
+    if (numbers.size() == 6)
+      offset.turn = kRadiansPerDegree * Vec3(numbers[3], numbers[4], numbers[5]);
+    offsets.push_back(offset);
+  }
+  if (!errors.empty()) return Result<std::vector<OffsetOption>>::failure(std::move(errors));
+  return offsets;
+}
+
+Result<std::map<int, double>> read_tools(const std::vector<std::string>& texts) {
+  std::map<int, double> tools;
+  Diagnostics errors;
+  for (const auto& text : texts) {
+    const auto at = text.find('=');
+    const auto number = at == std::string::npos ? std::nullopt : read_number(text.substr(0, at));
+    const auto length = at == std::string::npos ? std::nullopt : read_number(text.substr(at + 1));
+    if (!number || !length || *number < 1 || *number != std::floor(*number) || *number > 99999 ||
+        *length < 0.0 || *length > 10000.0)
+      errors.push_back(usage_error("US143", "--tool " + text +
+                                                ": expected is N=length, a tool number and its length in "
+                                                "mm (0 to 10000)"));
+    else
+      tools[static_cast<int>(*number)] = *length;
+  }
+  if (!errors.empty()) return Result<std::map<int, double>>::failure(std::move(errors));
+  return tools;
+}
+
+}  // namespace smoothpost

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/nc/interpreter.h"
+#include "kernels/core/result.h"
+#include "machines/definition/machine.h"
+#include "machines/definition/machine_file.h"
+#include "postproc/pipeline/options.h"
+
+namespace smoothpost {
+
+struct LoadedMachine {
+  MachineDefinition definition;
+  std::string path;
+  std::string text;
+};
+
+/// Folders that machine names are searched in, in order: --machine-path, $SMOOTHPOST_MACHINES, the
+/// installed share/smoothpost/machines and the source tree's machines/ beside the library.
+std::vector<std::string> machine_folders(const Options& options);
+
+/// A machine by name or file, with `overrides` applied.
+Result<LoadedMachine> load_machine(const std::string& name_or_file, const Options& options,
+                                   const std::vector<MachineOverride>& overrides);
+
+/// --set and the options that are short for it (--tip-tolerance, --smoothing ...), as overrides.
+Result<std::vector<MachineOverride>> overrides_of(const Options& options);
+
+/// "G54=1,2,3[,a,b,c]" for every entry; mm and degrees, `a b c` turn about X, Y, Z in the order Rz·Ry·Rx.
+struct OffsetOption {
+  int system = 1;
+  Vec3 position = Vec3::Zero();
+  Vec3 turn = Vec3::Zero();  ///< rad
+};
+Result<std::vector<OffsetOption>> read_offsets(const std::vector<std::string>& texts,
+                                               const std::string& option);
+
+/// "N=length" for every entry, mm.
+Result<std::map<int, double>> read_tools(const std::vector<std::string>& texts);
+
+/// A finite decimal number; nothing for anything else.
+std::optional<double> read_number(std::string_view text);
+
+Diagnostic usage_error(const char* code, std::string text);
+
+}  // namespace smoothpost

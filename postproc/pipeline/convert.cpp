@@ -1,0 +1,422 @@
+#include "postproc/pipeline/convert.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "kernels/core/units.h"
+#include "kernels/geometry/part_registration.h"
+#include "kernels/geometry/triangle_tree.h"
+#include "postproc/pipeline/joint_plan.h"
+#include "postproc/pipeline/machine_program.h"
+#include "postproc/pipeline/registry.h"
+
+namespace smoothpost {
+
+namespace {
+
+class Stopwatch {
+ public:
+  explicit Stopwatch(std::vector<StageTime>& stages) : stages_(stages) {}
+  void lap(const char* name) {
+    const auto now = std::chrono::steady_clock::now();
+    stages_.push_back({name, std::chrono::duration<double>(now - last_).count()});
+    last_ = now;
+  }
+
+ private:
+  std::vector<StageTime>& stages_;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+void append(Diagnostics& to, const Diagnostics& from) { to.insert(to.end(), from.begin(), from.end()); }
+
+Diagnostic diagnostic(const char* code, std::string text, std::string file = {}, int line = 0) {
+  Diagnostic d;
+  d.code = code;
+  d.text = std::move(text);
+  d.where = {std::move(file), line, 0};
+  return d;
+}
+
+ScrewChain placed_chain(const MachineDefinition& machine, const Pose& placement) {
+  ScrewChain chain = chain_of(machine);
+  chain.workpiece_home = chain.workpiece_home * placement;
+  return chain;
+}
+
+RegistrationSettings registration_settings(const MachineDefinition& machine) {
+  RegistrationSettings s;
+  s.nominal_gap = machine.tool.gap;
+  s.allowed_gap_deviation = machine.tool.gap - machine.tool.min_gap;
+  return s;
+}
+
+Check registration_check(const PartRegistration& registration, const RegistrationSettings& settings) {
+  Check c;
+  c.name = "part_registration";
+  c.value = registration.gap.worst_deviation;
+  c.limit = settings.allowed_gap_deviation;
+  c.unit = "mm";
+  c.ok = registration.verdict == RegistrationVerdict::registered;
+  c.note = registration.sentence;
+  return c;
+}
+
+/// Where the input's path meets the part: before anything is planned, so that an inch file or a wrong zero
+/// is named as what it is.
+class PartCheck {
+ public:
+  PartCheck(const TriangleMesh& part, const MachineDefinition& machine)
+      : settings_(registration_settings(machine)), tree_(build_triangle_tree(part)) {}
+
+  const Diagnostics& diagnostics() const { return tree_.diagnostics(); }
+  bool ok() const { return tree_.ok(); }
+
+  Check input(const ToolPath& path) const {
+    std::vector<CutterLocation> points;
+    for (std::size_t i = 1; i < path.points.size(); ++i)
+      if (path.points[i].beam) points.push_back(path.points[i].location);
+    return registration_check(register_part(points, tree_.value(), settings_), settings_);
+  }
+
+  Check output(const ReadBack& read, const ScrewChain& chain) const {
+    const auto locations = beam_locations(read, chain);
+    Check c;
+    c.name = "gap";
+    c.unit = "mm";
+    c.limit = settings_.allowed_gap_deviation;
+    std::uint32_t hint = 0;
+    std::size_t worst = 0;
+    for (std::size_t i = 0; i < locations.size(); ++i) {
+      const ClosestPoint closest = tree_.value().closest(locations[i].tip, hint);
+      hint = closest.triangle;
+      const double deviation = std::abs(closest.signed_distance - settings_.nominal_gap);
+      if (deviation > c.value || i == 0) {
+        c.value = deviation;
+        worst = i;
+      }
+    }
+    c.ok = c.value <= c.limit;
+    c.output_line = line_of(read, worst);
+    return c;
+  }
+
+ private:
+  // The block of the k-th beam location (see beam_locations).
+  static std::uint32_t line_of(const ReadBack& read, std::size_t k) {
+    std::size_t n = 0;
+    for (std::size_t i = 1; i < read.moves.size(); ++i) {
+      if (!read.moves[i].beam) continue;
+      n += read.moves[i - 1].beam ? 2 : 3;
+      if (k < n) return read.moves[i].line;
+    }
+    return 0;
+  }
+
+  RegistrationSettings settings_;
+  Result<TriangleTree> tree_;
+};
+
+/// Fills what does not depend on how the program was made.
+void describe_input(const InterpretedInput& input, const ReferencePath& reference, Conversion& out) {
+  bool in_cut = false;
+  bool in_link = false;
+  for (std::size_t k = 1; k < input.path.points.size(); ++k) {
+    const PathPoint& p = input.path.points[k];
+    out.programmed_time += p.duration;
+    out.length += reference.length(k);
+    const bool cut = p.kind == MotionKind::feed;
+    if (cut && !in_cut) ++out.cuts;
+    if (!cut && !in_link) ++out.links;
+    in_cut = cut;
+    in_link = !cut;
+  }
+  out.reference = input.reference;
+  out.assumes = input.assumes;
+}
+
+void describe_promises(const MachineDefinition& machine, bool has_part, Conversion& out) {
+  const double tip = machine.tolerance.tip;
+  const ToleranceBudget& share = machine.tolerance.budget;
+  out.budget_mm = {share.merge * tip, share.smoothing * tip, share.chord * tip, share.rounding * tip,
+                   share.controller * tip};
+  out.assumes.push_back("the machine is as its definition file says: axes, pivots and tool are calibrated");
+  if (machine.dialect.offset_guard)
+    out.assumes.push_back("every work, G92 and tool offset of the controller is zero: the program aborts "
+                          "before its first motion otherwise");
+  out.not_checked.push_back("clearance");
+  out.not_checked.push_back("acceleration_limit");
+  out.not_checked.push_back("jerk_limit");
+  if (!has_part) {
+    out.not_checked.push_back("part_registration");
+    out.not_checked.push_back("gap");
+  }
+  std::string assumed;
+  for (const auto& axis : machine.axes)
+    if (axis.source == LimitSource::assumed) assumed += (assumed.empty() ? "" : ", ") + axis.name;
+  if (!assumed.empty()) out.assumes.push_back("the limits of these axes are assumed, not from a datasheet: " + assumed);
+}
+
+}  // namespace
+
+bool Conversion::checks_ok() const {
+  return std::all_of(checks.begin(), checks.end(), [](const Check& c) { return c.ok; });
+}
+
+std::string to_string(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::certified:
+      return "certified";
+    case Verdict::limits_only:
+      return "limits_only";
+    case Verdict::refused:
+      return "refused";
+    case Verdict::forced:
+      return "forced";
+  }
+  return "refused";
+}
+
+namespace {
+
+/// One conversion, stage by stage; each stage returns false when there is no way on.
+class Converter {
+ public:
+  Converter(const ConvertInput& in, bool force, const Progress& progress)
+      : in_(in), force_(force), progress_(progress), watch_(out_.stages),
+        reference_(in.input.path, in.input.frames) {}
+
+  Conversion run() {
+    describe_input(in_.input, reference_, out_);
+    const bool beam_part = in_.part && uses_beam();
+    describe_promises(in_.machine, beam_part, out_);
+    if (!in_.placement_text.empty()) out_.assumes.push_back(in_.placement_text);
+    watch_.lap("interpret");
+    if (!recipe_is_possible()) return finish(false);
+    if (beam_part && !register_input()) return finish(false);
+    if (in_.part && !uses_beam())
+      out_.not_checked.push_back("part_registration and gap: the program has no beam-on motion");
+    const bool made = plan() && emit() && verify();
+    return finish(made);
+  }
+
+ private:
+  bool uses_beam() const {
+    return std::any_of(in_.input.path.points.begin(), in_.input.path.points.end(),
+                       [](const PathPoint& p) { return p.beam; });
+  }
+
+  // Settings that name what this version does not do are refused, never ignored.
+  bool recipe_is_possible() {
+    const auto& r = in_.machine.recipe;
+    const auto refuse = [this](const std::string& key, const std::string& value, const char* possible) {
+      out_.diagnostics.push_back(diagnostic(
+          "US120", key + " = \"" + value + "\" is not possible in this version; possible: " + possible));
+    };
+    if (r.smoothing != "none") refuse("recipe.smoothing", r.smoothing, "none");
+    if (r.orientation != "programmed") refuse("recipe.orientation", r.orientation, "programmed");
+    if (r.optimise != "none") refuse("recipe.optimise", r.optimise, "none");
+    if (r.schedule != "programmed") refuse("recipe.schedule", r.schedule, "programmed");
+    if (in_.machine.tolerance.lead != 0.0 || in_.machine.tolerance.tilt != 0.0)
+      refuse("tolerance.lead_deg and tilt_deg", "free", "0 (the programmed tool axis is kept)");
+    if (in_.machine.dialect.mode != "joint") refuse("dialect.mode", in_.machine.dialect.mode, "joint");
+    if (in_.machine.dialect.path_mode != "exact")
+      refuse("dialect.path_mode", in_.machine.dialect.path_mode, "exact");
+    return !has_error(out_.diagnostics);
+  }
+
+  bool register_input() {
+    part_.emplace(*in_.part, in_.machine);
+    append(out_.diagnostics, part_->diagnostics());
+    if (!part_->ok()) return false;
+    const Check c = part_->input(in_.input.path);
+    if (!c.ok) out_.diagnostics.push_back(diagnostic("RG201", c.note, in_.part_name));
+    out_.checks.push_back(c);
+    watch_.lap("registration");
+    return c.ok || force_;
+  }
+
+  bool plan() {
+    chain_ = placed_chain(in_.machine, in_.placement);
+    const auto pair = RotaryPair::from(chain_);
+    if (!pair) {
+      out_.diagnostics.push_back(diagnostic(
+          "KN110", "machine " + in_.machine.name +
+                       " has no closed form in this version: two free rotary and three free linear axes "
+                       "are needed, further axes redundant = true"));
+      return false;
+    }
+    const auto& tolerance = in_.machine.tolerance;
+    JointPlanSettings settings;
+    settings.tip_tolerance = tolerance.tip * tolerance.budget.chord;
+    settings.axis_tolerance = tolerance.axis * tolerance.budget.chord;
+    settings.held = home_of(in_.machine);
+    settings.file_name = in_.input_name;
+    const auto samples = plan_joints(reference_, *pair, settings, progress_);
+    append(out_.diagnostics, samples.diagnostics());
+    watch_.lap("kinematics");
+    if (!samples.ok()) return false;
+    program_ = build_program(in_.input, in_.machine, chain_, samples.value());
+    program_.title = in_.title;
+    program_.certified = true;
+    return true;
+  }
+
+  bool emit() {
+    const Dialect* dialect = find_dialect(in_.machine.dialect.name);
+    if (!dialect) {
+      out_.diagnostics.push_back(
+          diagnostic("US121", "no output dialect \"" + in_.machine.dialect.name +
+                                  "\" in this version: `smoothpost formats` lists them"));
+      return false;
+    }
+    dialect_ = dialect;
+    out_.interpolation = dialect->interpolation;
+    auto emitted = dialect->emit(in_.machine, program_);
+    for (auto d : emitted.diagnostics()) {
+      if (d.where.file.empty()) d.where.file = in_.input_name;
+      out_.diagnostics.push_back(std::move(d));
+    }
+    watch_.lap("emit");
+    if (!emitted.ok()) return false;
+    out_.line_map = line_map_of(program_, emitted.value());
+    out_.program = std::move(emitted.value().text);
+    return true;
+  }
+
+  bool verify() {
+    auto read = dialect_->read_back(in_.machine, out_.program, "output");
+    watch_.lap("read back");
+    append(out_.diagnostics, read.diagnostics());
+    if (!read.ok()) {
+      out_.diagnostics.push_back(diagnostic("IN110", "the program could not be read back"));
+      return false;
+    }
+    out_.read = std::move(read.value());
+    Verification machine = verify_machine(out_.read, in_.machine);
+    const Checks deviation =
+        verify_deviation(out_.read, in_.machine, {reference_, out_.line_map, program_, chain_}, progress_);
+    out_.checks.insert(out_.checks.end(), deviation.begin(), deviation.end());
+    if (part_ && part_->ok()) out_.checks.push_back(part_->output(out_.read, chain_));
+    out_.checks.insert(out_.checks.end(), machine.checks.begin(), machine.checks.end());
+    out_.axes = std::move(machine.axes);
+    out_.scheduled_time = machine.scheduled_time;
+    for (Check& c : out_.checks) give_input_line(c);
+    out_.blocks = out_.read.moves.size();
+    watch_.lap("verify");
+    return true;
+  }
+
+  void give_input_line(Check& check) const {
+    if (check.input_line != 0 || check.output_line == 0) return;
+    const auto entry = std::lower_bound(
+        out_.line_map.begin(), out_.line_map.end(), check.output_line,
+        [](const LineMapEntry& e, std::uint32_t line) { return e.output_line < line; });
+    if (entry != out_.line_map.end()) check.input_line = entry->input_line;
+  }
+
+  Conversion finish(bool made) {
+    bool beam_rules_ok = true;
+    for (const Check& c : out_.checks) {
+      if (c.ok) continue;
+      if (c.name.rfind("beam_", 0) == 0) beam_rules_ok = false;
+      out_.diagnostics.push_back(diagnostic(
+          "CK101", describe(c), in_.input_name, static_cast<int>(c.input_line)));
+    }
+    if (made && out_.checks_ok() && !has_error(out_.diagnostics)) {
+      out_.verdict = Verdict::certified;
+    } else if (made && force_ && beam_rules_ok) {
+      out_.verdict = Verdict::forced;
+      reprint_uncertified();
+    } else {
+      out_.verdict = Verdict::refused;
+    }
+    return std::move(out_);
+  }
+
+  static std::string number(double value) {
+    std::string text = std::to_string(value);
+    while (text.back() == '0') text.pop_back();
+    if (text.back() == '.') text.pop_back();
+    return text;
+  }
+
+  static std::string describe(const Check& c) {
+    std::string text = "check " + c.name + " failed: " + number(c.value) + " " + c.unit + ", limit " +
+                       number(c.limit) + " " + c.unit;
+    if (c.output_line > 0) text += ", output line " + std::to_string(c.output_line);
+    if (!c.note.empty()) text += ". " + c.note;
+    return text;
+  }
+
+  // The same program under its warning: the text that was checked, with other first lines.
+  void reprint_uncertified() {
+    program_.certified = false;
+    auto emitted = dialect_->emit(in_.machine, program_);
+    if (!emitted.ok()) return;
+    out_.line_map = line_map_of(program_, emitted.value());
+    out_.program = std::move(emitted.value().text);
+  }
+
+  const ConvertInput& in_;
+  bool force_;
+  const Progress& progress_;
+  Conversion out_;
+  Stopwatch watch_;
+  ReferencePath reference_;
+  ScrewChain chain_;
+  MachineProgram program_;
+  std::optional<PartCheck> part_;
+  const Dialect* dialect_ = nullptr;
+};
+
+}  // namespace
+
+Conversion convert(const ConvertInput& in, bool force, const Progress& progress) {
+  return Converter(in, force, progress).run();
+}
+
+Conversion check_program(const CheckInput& in, const Progress& progress) {
+  Conversion out;
+  Stopwatch watch(out.stages);
+  describe_promises(in.machine, in.part.has_value(), out);
+  out.not_checked.push_back("tip_deviation");
+  out.not_checked.push_back("axis_deviation");
+  const Dialect* dialect = find_dialect(in.machine.dialect.name);
+  if (!dialect) {
+    out.diagnostics.push_back(diagnostic("US121", "no output dialect \"" + in.machine.dialect.name +
+                                                      "\" in this version"));
+    return out;
+  }
+  out.interpolation = dialect->interpolation;
+  auto read = dialect->read_back(in.machine, in.text, in.file_name);
+  append(out.diagnostics, read.diagnostics());
+  watch.lap("read back");
+  if (!read.ok()) return out;
+  out.read = std::move(read.value());
+  Verification machine = verify_machine(out.read, in.machine);
+  out.checks = std::move(machine.checks);
+  out.axes = std::move(machine.axes);
+  out.scheduled_time = machine.scheduled_time;
+  out.blocks = out.read.moves.size();
+  if (in.part) {
+    const PartCheck part(*in.part, in.machine);
+    append(out.diagnostics, part.diagnostics());
+    const ScrewChain chain = placed_chain(in.machine, in.placement);
+    if (part.ok() && !beam_locations(out.read, chain).empty())
+      out.checks.push_back(part.output(out.read, chain));
+  }
+  progress("verify", 1.0);
+  watch.lap("verify");
+  for (const Check& c : out.checks)
+    if (!c.ok)
+      out.diagnostics.push_back(diagnostic(
+          "CK101", "check " + c.name + " failed: " + std::to_string(c.value) + " " + c.unit +
+                       ", limit " + std::to_string(c.limit) + " " + c.unit + (c.note.empty() ? "" : ". " + c.note),
+          in.file_name, static_cast<int>(c.output_line)));
+  out.verdict = has_error(out.diagnostics) ? Verdict::refused : Verdict::limits_only;
+  return out;
+}
+
+}  // namespace smoothpost

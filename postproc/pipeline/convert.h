@@ -1,0 +1,78 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "kernels/core/mesh.h"
+#include "kernels/core/progress.h"
+#include "postproc/pipeline/interpret.h"
+#include "postproc/pipeline/line_map.h"
+#include "postproc/pipeline/verify.h"
+
+namespace smoothpost {
+
+/// Everything one conversion needs, already read and validated.
+struct ConvertInput {
+  InterpretedInput input;
+  MachineDefinition machine;
+  Pose placement = Pose::Identity();  ///< X_WM'W: the program's zero in the machine's workpiece frame
+  std::string placement_text;         ///< for the certificate
+  std::optional<TriangleMesh> part;   ///< in the program's coordinates
+  std::string part_name;
+  std::string input_name;
+  std::vector<std::string> title;     ///< comment lines at the top of the program
+};
+
+enum class Verdict { certified, limits_only, refused, forced };
+std::string to_string(Verdict verdict);
+
+struct StageTime {
+  std::string name;
+  double seconds = 0.0;
+};
+
+/// A conversion with its certificate. `program` is empty when nothing could be made of the input.
+struct Conversion {
+  Verdict verdict = Verdict::refused;
+  std::string program;
+  LineMap line_map;
+  ReadBack read;
+  Checks checks;
+  std::vector<AxisSummary> axes;
+  Diagnostics diagnostics;
+  std::vector<std::string> assumes;
+  std::vector<std::string> not_checked;
+  std::string level = "geometry";
+  std::string interpolation;
+  std::string reference;
+  ToleranceBudget budget_mm;  ///< mm, not shares
+  double programmed_time = 0.0;
+  double scheduled_time = 0.0;
+  double length = 0.0;  ///< mm, of the tip
+  std::size_t cuts = 0;
+  std::size_t links = 0;
+  std::size_t blocks = 0;
+  std::vector<StageTime> stages;
+
+  bool checks_ok() const;
+};
+
+/// read -> registration -> kinematics -> emission -> read back -> certificate.
+/// The program is made when it can be made, also when a check fails (the verdict says so); the caller
+/// writes it only when it is certified or forced.
+Conversion convert(const ConvertInput& in, bool force, const Progress& progress);
+
+struct CheckInput {
+  std::string text;
+  std::string file_name;
+  MachineDefinition machine;
+  Pose placement = Pose::Identity();
+  std::optional<TriangleMesh> part;
+  std::string part_name;
+};
+
+/// Certifies an existing machine program against its machine alone: verdict limits_only or refused.
+Conversion check_program(const CheckInput& in, const Progress& progress);
+
+}  // namespace smoothpost

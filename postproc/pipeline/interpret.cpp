@@ -1,0 +1,426 @@
+#include "postproc/pipeline/interpret.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "formats/csv/cutter_locations.h"
+#include "formats/nc/parser.h"
+#include "kernels/core/units.h"
+
+namespace smoothpost {
+
+namespace {
+
+constexpr AxisMask kXyz = 0x7;
+constexpr AxisMask kRotary = 0x38;
+
+std::string words_text(AxisMask mask) {
+  std::string text;
+  for (int i = 0; i < kAxisWords; ++i)
+    if (mask >> i & 1U) text += (text.empty() ? "" : " ") + std::string(1, kAxisLetters[static_cast<std::size_t>(i)]);
+  return text;
+}
+
+class Recorder : public CanonicalSink {
+ public:
+  void motion(const CanonicalMotion& motion) override {
+    motions.push_back(motion);
+    order.push_back({Step::Kind::motion, motions.size() - 1});
+  }
+  void dwell(double seconds, std::uint32_t line) override {
+    PathEvent e;
+    e.kind = PathEvent::Kind::dwell;
+    e.seconds = seconds;
+    e.line = line;
+    add(std::move(e));
+  }
+  void event(const ProcessEvent& event) override {
+    PathEvent e;
+    e.event = event;
+    e.line = event.line;
+    add(std::move(e));
+  }
+  void comment(std::string_view text, std::uint32_t line) override {
+    PathEvent e;
+    e.kind = PathEvent::Kind::comment;
+    e.text = text;
+    e.line = line;
+    add(std::move(e));
+  }
+  void tool_length(double length, int tool, std::uint32_t line) override {
+    states.push_back({length, tool, Vec3::Zero(), 0.0, 0, line});
+    order.push_back({Step::Kind::tool, states.size() - 1});
+  }
+  void work_offset(const Vec3& origin, double rotation, int system, std::uint32_t line) override {
+    states.push_back({0.0, 0, origin, rotation, system, line});
+    order.push_back({Step::Kind::offset, states.size() - 1});
+  }
+  void program_end(std::uint32_t) override {}
+
+  struct State {
+    double length;
+    int tool;
+    Vec3 origin;
+    double rotation;
+    int system;
+    std::uint32_t line;
+  };
+  struct Step {
+    enum class Kind : std::uint8_t { motion, event, tool, offset } kind;
+    std::size_t index;
+  };
+  std::vector<CanonicalMotion> motions;
+  std::vector<PathEvent> events;
+  std::vector<State> states;
+  std::vector<Step> order;
+
+ private:
+  void add(PathEvent e) {
+    events.push_back(std::move(e));
+    order.push_back({Step::Kind::event, events.size() - 1});
+  }
+};
+
+/// Turns recorded calls into path points and events.
+class PathBuilder {
+ public:
+  PathBuilder(Recorder& recorder, const InputSettings& settings)
+      : recorder_(recorder), settings_(settings) {}
+
+  Result<InterpretedInput> run() {
+    survey();
+    if (recorder_.motions.empty()) fail("NC311", 0, "the program contains no motion");
+    if (!has_error(diagnostics_)) build();
+    if (has_error(diagnostics_))
+      return Result<InterpretedInput>::failure(std::move(diagnostics_));
+    describe();
+    return Result<InterpretedInput>(std::move(out_), std::move(diagnostics_));
+  }
+
+ private:
+  // Which words matter, which systems are used, where the last cut ends.
+  void survey() {
+    for (std::size_t i = 0; i < recorder_.motions.size(); ++i) {
+      const auto& m = recorder_.motions[i];
+      programmed_ |= m.programmed;
+      if (m.kind == MotionKind::feed) last_feed_ = i + 1;
+      if (m.tcp) uses_tcp_ = true;
+      else uses_joints_ = true;
+    }
+    programmed_ |= kXyz;
+    for (const auto& s : recorder_.states)
+      if (s.system == 0 && s.length != 0.0) compensates_ = true;
+    for (std::size_t i = last_feed_; i < recorder_.motions.size(); ++i)
+      if (recorder_.motions[i].machine_position) {
+        end_ = i;
+        break;
+      }
+    end_ = std::min(end_, recorder_.motions.size());
+  }
+
+  void build() {
+    if (settings_.machine) out_.frames.input_machine = settings_.machine;
+    for (const auto& step : recorder_.order) {
+      switch (step.kind) {
+        case Recorder::Step::Kind::tool:
+          set_tool(recorder_.states[step.index]);
+          break;
+        case Recorder::Step::Kind::offset:
+          set_offset(recorder_.states[step.index]);
+          break;
+        case Recorder::Step::Kind::event:
+          add_event(recorder_.events[step.index]);
+          break;
+        case Recorder::Step::Kind::motion:
+          if (step.index < end_) add_motion(recorder_.motions[step.index]);
+          else skipped_end_.push_back(recorder_.motions[step.index].line);
+          break;
+      }
+      if (has_error(diagnostics_)) return;
+    }
+    if (out_.path.points.empty())
+      fail("NC312", recorder_.motions.front().line,
+           "no motion of the program starts from a known position: " + words_text(programmed_) +
+               " are never all programmed");
+  }
+
+  void set_tool(const Recorder::State& state) {
+    compensation_ = state.length;
+    if (state.tool > 0) tool_in_use(state.tool);
+  }
+
+  void tool_in_use(int tool) {
+    out_.uses_tools = true;
+    tool_ = tool;
+    const auto known = settings_.tool_lengths.find(tool);
+    tool_length_ = known == settings_.tool_lengths.end() ? 0.0 : known->second;
+    if (known == settings_.tool_lengths.end() && compensation_ == 0.0) unknown_length_.insert({tool, 0});
+  }
+
+  void set_offset(const Recorder::State& state) {
+    if (!world_set_) {
+      out_.frames.world_from_part = Pose::Identity();
+      out_.frames.world_from_part.linear() = rotation_about(Vec3::UnitZ(), state.rotation);
+      out_.frames.world_from_part.translation() = state.origin;
+      first_system_ = state.system;
+      world_set_ = true;
+      return;
+    }
+    if (state.system != first_system_ && !settings_.work_offsets.contains(state.system) &&
+        state.origin == Vec3::Zero() && !other_systems_.contains(state.system)) {
+      other_systems_.insert({state.system, state.line});
+      fail("PR301", state.line,
+           "work offset system " + system_name(state.system) + " is used besides " +
+               system_name(first_system_) +
+               " and where it lies is not known: give --input-work-offset " +
+               system_name(state.system) + "=x,y,z (and that of " + system_name(first_system_) + ")");
+    }
+  }
+
+  void add_event(const PathEvent& event) {
+    PathEvent e = event;
+    e.before_start = out_.path.points.empty();
+    e.point = e.before_start ? 0 : out_.path.points.size() - 1;
+    if (e.kind == PathEvent::Kind::process) {
+      if (e.event.name == event_name::kBeamOn || e.event.name == event_name::kPierce) beam_ = true;
+      if (e.event.name == event_name::kBeamOff) beam_ = false;
+      if (e.event.name == event_name::kToolChange) {
+        for (const auto& [key, value] : e.event.parameters)
+          if (key == "tool") tool_in_use(std::atoi(value.c_str()));
+      }
+    }
+    out_.path.events.push_back(std::move(e));
+  }
+
+  void add_motion(const CanonicalMotion& motion) {
+    const AxisMask lacking_start = motion.unknown_start & programmed_;
+    const AxisMask lacking_end = motion.unknown_end & programmed_;
+    if (motion.kind == MotionKind::feed && lacking_start != 0) {
+      fail("NC313", motion.line,
+           "a feed motion starts where the position of " + words_text(lacking_start) +
+               " is unknown: program a rapid move to a full position before it",
+           motion.column);
+      return;
+    }
+    if (lacking_end != 0 || motion.machine_position) {
+      lost_ = true;
+      lost_lines_.push_back(motion.line);
+      return;
+    }
+    if (!world_set_) world_set_ = true;
+    PathPoint point = make_point(motion);
+    if (out_.path.points.empty()) {
+      point.kind = MotionKind::rapid;
+      point.is_arc = false;
+      first_line_ = motion.line;
+      if (lacking_start == 0 && motion.unknown_start == 0) add_start_point(motion, point);
+      if (lacking_start != 0) lost_lines_.push_back(motion.line);
+    } else if (lost_) {
+      point.replanned = true;
+      point.is_arc = false;
+      point.arc = -1;
+    }
+    lost_ = false;
+    push(std::move(point));
+  }
+
+  PathPoint make_point(const CanonicalMotion& motion) {
+    PathPoint point;
+    point.kind = motion.kind;
+    point.interpolation =
+        motion.tcp ? PathInterpolation::rotary_linear : PathInterpolation::joint_linear;
+    point.beam = beam_;
+    point.line = motion.line;
+    point.duration = motion.duration;
+    point.words = motion.end;
+    point.compensation = compensation_;
+    point.tool = tool_;
+    point.tool_length = tool_length_;
+    // A program that never compensates describes the tip itself; one that does is at the holder's
+    // reference until it compensates.
+    point.tip_offset = compensates_ ? tool_length_ - compensation_ : 0.0;
+    if (motion.is_arc) {
+      point.is_arc = true;
+      point.arc = static_cast<std::int32_t>(out_.path.arcs.size());
+      out_.path.arcs.push_back(motion.arc);
+    }
+    return point;
+  }
+
+  // A program whose first motion starts at a known place (an earlier lost motion ended there).
+  void add_start_point(const CanonicalMotion& motion, const PathPoint& like) {
+    PathPoint start = like;
+    start.words = motion.start;
+    start.is_arc = false;
+    start.arc = -1;
+    start.duration = 0.0;
+    out_.path.points.push_back(start);
+  }
+
+  void push(PathPoint point) {
+    if (!out_.path.points.empty() && !point.replanned) {
+      const PathPoint& last = out_.path.points.back();
+      const bool same_state = last.compensation == point.compensation &&
+                              last.tip_offset == point.tip_offset &&
+                              last.tool_length == point.tool_length &&
+                              last.interpolation == point.interpolation;
+      if (!same_state) {
+        // The controller changed its reading of the words here: a rapid across that place is ours to
+        // plan; a cut across it would start with a jump of the tip.
+        if (point.kind == MotionKind::feed) {
+          PathPoint seen = point;
+          ReferencePath probe(out_.path, out_.frames);
+          seen.words = last.words;
+          const auto before = probe.location_of_words(last.words, last);
+          const auto after = probe.location_of_words(last.words, point);
+          if ((before.tip - after.tip).norm() > 1e-6) {
+            fail("NC314", point.line,
+                 "a feed motion starts right after the tool length or TCP mode changed, where the tip "
+                 "jumps by " +
+                     std::to_string((before.tip - after.tip).norm()) +
+                     " mm: program a rapid move between them");
+            return;
+          }
+        }
+        point.replanned = point.kind == MotionKind::rapid;
+      }
+    }
+    out_.path.points.push_back(std::move(point));
+  }
+
+  void describe() {
+    out_.system = first_system_;
+    ReferencePath reference(out_.path, out_.frames);
+    for (auto& point : out_.path.points)
+      point.location = reference.location_of_words(point.words, point);
+    auto& assumes = out_.assumes;
+    if (settings_.machine)
+      assumes.push_back("the input was posted for machine " + settings_.machine->name);
+    if (!compensates_ && out_.uses_tools)
+      assumes.push_back("the program never activates a tool length: its coordinates are the tip's");
+    if (!lost_lines_.empty()) {
+      note("the way to the first full position (up to line " + std::to_string(first_line_) +
+           ") and over machine positions is re-planned: input lines " + line_list(lost_lines_));
+    }
+    if (!skipped_end_.empty())
+      note("the motions to machine positions at the end are replaced by the end of the output "
+           "program: input lines " +
+           line_list(skipped_end_));
+    if (uses_joints_ && settings_.machine && !settings_.work_offsets.contains(first_system_))
+      assumes.push_back("outside TCP mode the program's zero lies at the input machine's zero (no "
+                        "--input-work-offset given)");
+    out_.reference = uses_tcp_ && uses_joints_ ? "TCP mode: tip on lines and arcs, rotary joints linear; "
+                                                 "outside it all joints linear"
+                     : uses_tcp_ ? "tip on lines and arcs, rotary joints of the input machine linear"
+                                 : "joints of the input machine linear, arcs in XYZ";
+  }
+
+  static std::string line_list(std::vector<std::uint32_t> lines) {
+    std::sort(lines.begin(), lines.end());
+    lines.erase(std::unique(lines.begin(), lines.end()), lines.end());
+    std::string text;
+    for (std::size_t i = 0; i < lines.size() && i < 8; ++i)
+      text += (i ? ", " : "") + std::to_string(lines[i]);
+    if (lines.size() > 8) text += " and " + std::to_string(lines.size() - 8) + " more";
+    return text;
+  }
+
+  static std::string system_name(int system) {
+    if (system <= 6) return "G" + std::to_string(53 + system);
+    return "G59." + std::to_string(system - 6);
+  }
+
+  void note(std::string text) {
+    Diagnostic d;
+    d.severity = Severity::note;
+    d.code = "NC310";
+    d.text = std::move(text);
+    d.where.file = settings_.file_name;
+    diagnostics_.push_back(std::move(d));
+  }
+
+  void fail(const char* code, std::uint32_t line, std::string text, std::uint32_t column = 0) {
+    Diagnostic d;
+    d.code = code;
+    d.text = std::move(text);
+    d.where = {settings_.file_name, static_cast<int>(line), static_cast<int>(column)};
+    diagnostics_.push_back(std::move(d));
+  }
+
+  Recorder& recorder_;
+  const InputSettings& settings_;
+  InterpretedInput out_;
+  Diagnostics diagnostics_;
+  AxisMask programmed_ = 0;
+  std::size_t last_feed_ = 0;
+  std::size_t end_ = static_cast<std::size_t>(-1);
+  bool uses_tcp_ = false;
+  bool uses_joints_ = false;
+  bool compensates_ = false;
+  bool world_set_ = false;
+  int first_system_ = 1;
+  std::map<int, std::uint32_t> other_systems_;
+  double compensation_ = 0.0;
+  int tool_ = 0;
+  double tool_length_ = 0.0;
+  std::map<int, int> unknown_length_;
+  bool beam_ = false;
+  bool lost_ = false;
+  std::uint32_t first_line_ = 0;
+  std::vector<std::uint32_t> lost_lines_;
+  std::vector<std::uint32_t> skipped_end_;
+};
+
+nc::InterpreterSettings interpreter_settings(const InputSettings& settings) {
+  nc::InterpreterSettings s;
+  s.tool_lengths = settings.tool_lengths;
+  s.work_offsets = settings.work_offsets;
+  if (settings.machine) {
+    s.axes = 0;
+    for (const auto& axis : settings.machine->axes) {
+      const auto w = kAxisLetters.find(axis.letter);
+      if (w == std::string_view::npos) continue;
+      s.axes |= static_cast<AxisMask>(1U << w);
+      s.home[w] = axis.joint.home;
+    }
+    s.inch_default = settings.machine->dialect.units == "inch";
+    s.process = settings.machine->process;
+  } else {
+    s.axes = kXyz | kRotary;
+    s.any_axis_needs_machine = true;
+  }
+  if (settings.process) s.process = *settings.process;
+  return s;
+}
+
+}  // namespace
+
+Result<InterpretedInput> interpret_nc(std::string text, const InputSettings& settings) {
+  auto parsed = nc::parse(std::move(text), settings.file_name);
+  if (has_error(parsed.diagnostics))
+    return Result<InterpretedInput>::failure(std::move(parsed.diagnostics));
+  Recorder recorder;
+  const auto summary = nc::interpret(parsed.program, interpreter_settings(settings), recorder);
+  Diagnostics diagnostics = std::move(parsed.diagnostics);
+  diagnostics.insert(diagnostics.end(), summary.diagnostics().begin(), summary.diagnostics().end());
+  if (!summary.ok()) return Result<InterpretedInput>::failure(std::move(diagnostics));
+  auto built = PathBuilder(recorder, settings).run();
+  diagnostics.insert(diagnostics.end(), built.diagnostics().begin(), built.diagnostics().end());
+  if (!built.ok()) return Result<InterpretedInput>::failure(std::move(diagnostics));
+  built.value().lines = parsed.program.blocks.size();
+  return Result<InterpretedInput>(std::move(built.value()), std::move(diagnostics));
+}
+
+Result<InterpretedInput> interpret_csv(std::string text, const InputSettings& settings) {
+  const std::size_t lines = static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+  auto read = read_cutter_locations(text, settings.file_name);
+  if (!read.ok()) return Result<InterpretedInput>::failure(read.diagnostics());
+  InterpretedInput input;
+  input.path = std::move(read.value());
+  input.reference = "tip on straight lines, tool axis on great circles";
+  input.lines = lines;
+  return Result<InterpretedInput>(std::move(input), read.diagnostics());
+}
+
+}  // namespace smoothpost

@@ -1,0 +1,274 @@
+#include "postproc/pipeline/joint_plan.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/core/units.h"
+#include "kernels/kinematics/branch_tracking.h"
+
+namespace smoothpost {
+
+namespace {
+
+constexpr double kAxisStep = 2.0 * kRadiansPerDegree;     // between tracked points
+constexpr double kRotaryStep = 30.0 * kRadiansPerDegree;  // of the first rotary, outside the pole cap
+constexpr double kTurnCap = 1.5;  // of the cap: where the first rotary may turn with the axis on the pole
+constexpr int kMaxSplits = 40;
+
+double nearest_turn(double angle, double reference) {
+  return angle + 2.0 * kPi * std::round((reference - angle) / (2.0 * kPi));
+}
+
+class Planner {
+ public:
+  Planner(const ReferencePath& reference, const RotaryPair& pair, const JointPlanSettings& settings,
+          const Progress& progress)
+      : reference_(reference), pair_(pair), settings_(settings), progress_(progress) {
+    // The pole is the first rotary's own direction, seen from the part; it does not move with the path.
+    pole_ = jacobian(pair.chain(), settings.held).col(pair.first_rotary()).head<3>().normalized();
+    cap_ = 0.4 * settings.axis_tolerance;
+  }
+
+  Result<std::vector<JointSample>> run() {
+    collect_tracked();
+    const BranchTracking tracking = track();
+    if (tracking.status != BranchTracking::Status::ok) return fail(tracking);
+    for (std::size_t i = 0; i < tracked_.size(); ++i) {
+      JointSample to = tracked_[i];
+      to.q = tracking.q[i];
+      to.branch = tracking.branch[i];
+      if (i > 0 && !replanned(to.segment)) {
+        const JointSample from = at_start_of(samples_.back(), to.segment);
+        if (!refine(from, to, 0)) return too_steep(to.segment);
+      }
+      samples_.push_back(std::move(to));
+      if (i % 4096 == 0 && !progress_("kinematics", static_cast<double>(i) / static_cast<double>(tracked_.size())))
+        return cancelled();
+    }
+    return Result<std::vector<JointSample>>(std::move(samples_));
+  }
+
+ private:
+  bool replanned(std::size_t segment) const {
+    return segment > 0 && reference_.path().points[segment].replanned;
+  }
+
+  static JointSample at_start_of(JointSample sample, std::uint32_t segment) {
+    if (sample.segment != segment) {
+      sample.segment = segment;
+      sample.s = 0.0;
+    }
+    return sample;
+  }
+
+  // The pose asked of the chain: of the holder, with an axis inside the cap put onto the pole.
+  CutterLocation target(std::size_t segment, double s, double cap_share = 1.0) const {
+    const auto& points = reference_.path().points;
+    CutterLocation location = segment == 0 ? points[0].location : reference_.at(segment, s);
+    const double tool_length = points[segment].tool_length;
+    if (in_cap(location.axis, cap_share))
+      location.axis = location.axis.dot(pole_) > 0.0 ? pole_ : Vec3(-pole_);
+    return holder_location(location, tool_length);
+  }
+
+  bool in_cap(const Vec3& axis, double cap_share = 1.0) const {
+    return std::min(angle_between(axis, pole_), angle_between(axis, -pole_)) <= cap_share * cap_;
+  }
+
+  void collect_tracked() {
+    tracked_.push_back({0, 1.0, 0, {}});
+    locations_.push_back(target(0, 1.0));
+    for (std::size_t k = 1; k <= reference_.segments(); ++k) {
+      if (!replanned(k)) {
+        const CutterLocation from = target(k, 0.0);
+        const CutterLocation to = target(k, 1.0);
+        subdivide(k, {0.0, from}, {1.0, to}, 0);
+      } else {
+        add_tracked(k, 1.0, target(k, 1.0));
+      }
+    }
+  }
+
+  struct Node {
+    double s;
+    CutterLocation location;
+  };
+
+  void subdivide(std::size_t segment, const Node& from, const Node& to, int depth) {
+    // A full turn of a rotary has equal ends: look at the middle too before a long segment is accepted.
+    const double mid_s = 0.5 * (from.s + to.s);
+    const bool may_turn = depth < 3 && turns_more_than_it_shows(segment);
+    if (depth < kMaxSplits && (may_turn || too_far(from.location, to.location))) {
+      const Node mid{mid_s, target(segment, mid_s)};
+      subdivide(segment, from, mid, depth + 1);
+      subdivide(segment, mid, to, depth + 1);
+      return;
+    }
+    add_tracked(segment, to.s, to.location);
+  }
+
+  bool turns_more_than_it_shows(std::size_t segment) const {
+    const double bound = reference_.second_derivative_bound(segment).axis;  // (total turn)²
+    return bound > kAxisStep * kAxisStep;
+  }
+
+  bool too_far(const CutterLocation& a, const CutterLocation& b) const {
+    const double step = angle_between(a.axis, b.axis);
+    if (step > kAxisStep) return true;
+    if (step < 0.25 * cap_ || in_cap(a.axis) || in_cap(b.axis)) return false;
+    // Outside the cap the first rotary turns with the azimuth about the pole.
+    const Vec3 pa = a.axis - pole_ * pole_.dot(a.axis);
+    const Vec3 pb = b.axis - pole_ * pole_.dot(b.axis);
+    return angle_between(pa.normalized(), pb.normalized()) > kRotaryStep;
+  }
+
+  void add_tracked(std::size_t segment, double s, CutterLocation location) {
+    tracked_.push_back({static_cast<std::uint32_t>(segment), s, 0, {}});
+    locations_.push_back(std::move(location));
+  }
+
+  BranchTracking track() const {
+    std::vector<TrackingPoint> points(tracked_.size());
+    const auto& path = reference_.path().points;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const PathPoint& p = path[tracked_[i].segment];
+      points[i].location = locations_[i];
+      points[i].line = p.line;
+      // With the axis on the pole the first rotary is free; where it has to turn, it turns on a rapid.
+      const bool may_turn = i > 0 && p.kind == MotionKind::rapid &&
+                            in_cap(locations_[i - 1].axis) && in_cap(locations_[i].axis);
+      points[i].cut = !p.replanned && !may_turn;
+    }
+    BranchTrackingSettings s;
+    s.held = settings_.held;
+    s.pole_cap = cap_ * 1e-3;  // axes inside the cap stand on the pole already
+    return track_branches(pair_, points, s);
+  }
+
+  // Splits [from, to] until straight joint motion follows the reference; appends the samples between.
+  bool refine(const JointSample& from, const JointSample& to, int depth) {
+    if (follows(from, to)) return true;
+    if (depth >= kMaxSplits) return false;
+    JointSample mid;
+    mid.segment = to.segment;
+    mid.s = 0.5 * (from.s + to.s);
+    const JointVector mean = 0.5 * (from.q + to.q);
+    if (!place(mid, mean, 1.0)) return false;
+    // At the rim of the cap the first rotary is on one side of the step whatever the share s is: there the
+    // axis goes onto the pole for the turn, still inside the tolerance.
+    const int first = pair_.first_rotary();
+    const double step = std::abs(to.q[first] - from.q[first]);
+    if (step > 1e-9 && std::abs(mid.q[first] - mean[first]) > 0.35 * step &&
+        in_cap(reference_.at(to.segment, from.s).axis, kTurnCap) &&
+        in_cap(reference_.at(to.segment, to.s).axis, kTurnCap)) {
+      if (!place(mid, mean, kTurnCap)) return false;
+    }
+    if (!refine(from, mid, depth + 1)) return false;
+    samples_.push_back(mid);
+    return refine(mid, to, depth + 1);
+  }
+
+  // Sets mid.q and mid.branch to the solution nearest to `mean`.
+  bool place(JointSample& mid, const JointVector& mean, double cap_share) const {
+    const RotaryPairSolutions solutions =
+        pair_.solve(target(mid.segment, mid.s, cap_share), mean);
+    double best = INFINITY;
+    for (int b = 0; b < 2; ++b) {
+      if (!solutions.valid[static_cast<std::size_t>(b)]) continue;
+      JointVector q = solutions.q[static_cast<std::size_t>(b)];
+      double distance = 0.0;
+      for (const int j : {pair_.first_rotary(), pair_.second_rotary()}) {
+        q[j] = nearest_turn(q[j], mean[j]);
+        distance += std::abs(q[j] - mean[j]);
+      }
+      if (distance >= best) continue;
+      best = distance;
+      mid.q = q;
+      mid.branch = b;
+    }
+    return best < INFINITY;
+  }
+
+  bool follows(const JointSample& from, const JointSample& to) const {
+    const double tool_length = reference_.path().points[to.segment].tool_length;
+    for (const double t : {0.25, 0.5, 0.75}) {
+      const CutterLocation wanted = reference_.at(to.segment, from.s + t * (to.s - from.s));
+      const JointVector q = from.q + t * (to.q - from.q);
+      const CutterLocation holder = forward_location(pair_.chain(), q);
+      const Vec3 tip = holder.tip - tool_length * holder.axis;
+      if ((tip - wanted.tip).norm() > 0.8 * settings_.tip_tolerance) return false;
+      if ((holder.axis - wanted.axis).norm() > 0.8 * settings_.axis_tolerance) return false;
+    }
+    return true;
+  }
+
+  Diagnostic at_line(const char* code, std::uint32_t line, std::string text) const {
+    Diagnostic d;
+    d.code = code;
+    d.text = std::move(text);
+    d.where = {settings_.file_name, static_cast<int>(line), 0};
+    return d;
+  }
+
+  Result<std::vector<JointSample>> fail(const BranchTracking& tracking) const {
+    Diagnostics out;
+    const std::uint32_t line = reference_.path().points[tracked_[tracking.point].segment].line;
+    switch (tracking.status) {
+      case BranchTracking::Status::unreachable:
+        out.push_back(at_line("KN101", line, "the tool axis cannot be reached by this machine: " + tracking.reason));
+        break;
+      case BranchTracking::Status::over_limit:
+        out.push_back(at_line("KN102", line,
+                              "no position of the machine within its limits: " + tracking.reason +
+                                  ". Place the part elsewhere with --work-offset or choose another machine"));
+        break;
+      default:
+        for (const auto& rewind : tracking.rewinds)
+          out.push_back(at_line("KN103", rewind.line,
+                                "the cut cannot go on without a rewind here: " + rewind.reason +
+                                    ". Split the cut before this line or choose a machine with more range"));
+        if (out.empty())
+          out.push_back(at_line("KN103", line, "a rewind is needed: " + tracking.reason));
+        break;
+    }
+    return Result<std::vector<JointSample>>::failure(std::move(out));
+  }
+
+  Result<std::vector<JointSample>> too_steep(std::size_t segment) const {
+    return Result<std::vector<JointSample>>::failure(at_line(
+        "KN104", reference_.path().points[segment].line,
+        "the machine cannot follow this motion inside the tolerances: a rotary would have to jump (the "
+        "tool axis passes the machine's pole). Widen --axis-tolerance or change the tool axis there"));
+  }
+
+  static Result<std::vector<JointSample>> cancelled() {
+    Diagnostic d;
+    d.code = "US190";
+    d.text = "cancelled";
+    return Result<std::vector<JointSample>>::failure(d);
+  }
+
+  const ReferencePath& reference_;
+  const RotaryPair& pair_;
+  const JointPlanSettings& settings_;
+  const Progress& progress_;
+  Vec3 pole_;
+  double cap_ = 0.0;
+  std::vector<JointSample> tracked_;
+  std::vector<CutterLocation> locations_;
+  std::vector<JointSample> samples_;
+};
+
+}  // namespace
+
+CutterLocation holder_location(const CutterLocation& tip, double tool_length) {
+  return {tip.tip + tool_length * tip.axis, tip.axis};
+}
+
+Result<std::vector<JointSample>> plan_joints(const ReferencePath& reference, const RotaryPair& pair,
+                                             const JointPlanSettings& settings,
+                                             const Progress& progress) {
+  return Planner(reference, pair, settings, progress).run();
+}
+
+}  // namespace smoothpost

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace smoothpost {
+
+/// One run of the tool: every option under the name it has on the command line, in a job file and in the
+/// C structure. Text is as the user wrote it; `settings.h` reads it.
+struct Options {
+  std::string command;                ///< convert | check | machines | formats | golden
+  std::vector<std::string> arguments; ///< sub-command words: list, show NAME, run DIR ...
+  std::string input;                  ///< path, or "-"
+  std::optional<std::string> input_data;      ///< bytes given by the host instead of a file
+  std::string machine;
+  std::string machine_path;           ///< folders separated by ':', searched before the others
+  std::string workpiece;              ///< STL path
+  std::optional<std::string> workpiece_data;
+  std::string workpiece_unit;         ///< mm (default) | inch: the unit of the STL's numbers
+  std::string output;                 ///< path, "-", or empty for the default
+  std::string dialect;
+  std::string input_format;
+  std::string input_dialect;
+  std::string input_machine;
+  std::string process;
+  std::vector<std::string> work_offset;        ///< G54=x,y,z[,a,b,c]: on the output machine
+  std::vector<std::string> input_work_offset;  ///< G54=x,y,z[,a,b,c]: on the input machine
+  std::vector<std::string> tool;               ///< N=length
+  std::string tip_tolerance;
+  std::string axis_tolerance;
+  std::string lead;
+  std::string tilt;
+  std::string smoothing;
+  std::string orientation;
+  std::string optimise;
+  std::string schedule;
+  std::string links;
+  std::string cuts;
+  std::string against;
+  std::string json;
+  std::string report;
+  std::string trajectory;
+  std::string line_map;
+  std::vector<std::string> set;  ///< section.key=value
+  bool no_collision_check = false;
+  bool timings = false;
+  bool force = false;
+};
+
+}  // namespace smoothpost

@@ -1,0 +1,50 @@
+#include "postproc/pipeline/registry.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "machines/dialects/linuxcnc.h"
+
+namespace smoothpost {
+
+namespace {
+
+constexpr std::array<InputFormat, 2> kFormats = {{
+    {"csv", "cutter locations, one a line (docs/formats_csv.md)", "csv", false, &interpret_csv},
+    {"nc", "NC program, RS274NGC as LinuxCNC reads it (docs/formats_nc.md)",
+     "ngc nc tap cnc gcode eia mpf spf txt", true, &interpret_nc},
+}};
+
+}  // namespace
+
+std::span<const InputFormat> input_formats() { return kFormats; }
+
+std::span<const Dialect> dialects() { return {&linuxcnc::kDialect, 1}; }
+
+const InputFormat* find_input_format(std::string_view name) {
+  for (const auto& row : kFormats)
+    if (row.name == name) return &row;
+  return nullptr;
+}
+
+const Dialect* find_dialect(std::string_view name) {
+  for (const auto& row : dialects())
+    if (row.name == name) return &row;
+  return nullptr;
+}
+
+const InputFormat* format_by_extension(std::string_view file_name) {
+  const auto dot = file_name.rfind('.');
+  if (dot == std::string_view::npos) return nullptr;
+  std::string extension(file_name.substr(dot + 1));
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return c >= 'A' && c <= 'Z' ? c + 32 : c; });
+  for (const auto& row : kFormats) {
+    const std::string list = " " + std::string(row.extensions) + " ";
+    if (list.find(" " + extension + " ") != std::string::npos) return &row;
+  }
+  return nullptr;
+}
+
+}  // namespace smoothpost

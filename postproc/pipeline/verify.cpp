@@ -1,0 +1,376 @@
+#include "postproc/pipeline/verify.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "kernels/core/units.h"
+
+namespace smoothpost {
+
+namespace {
+
+bool is_rotary(const AxisDefinition& axis) { return axis.joint.kind == JointKind::rotary; }
+double display_scale(const AxisDefinition& axis) { return is_rotary(axis) ? kDegreesPerRadian : 1.0; }
+std::string unit_of(const AxisDefinition& axis) { return is_rotary(axis) ? "deg" : "mm"; }
+
+std::string source_name(LimitSource source) {
+  switch (source) {
+    case LimitSource::datasheet:
+      return "datasheet";
+    case LimitSource::measured:
+      return "measured";
+    case LimitSource::assumed:
+      return "assumed";
+  }
+  return "assumed";
+}
+
+bool has_beam(const MachineDefinition& machine) {
+  return machine.has_event(event_name::kBeamOn) || machine.has_event(event_name::kPierce);
+}
+
+/// Time at the end of each move, s: printed durations, rapids at the velocity limits.
+std::vector<double> move_times(const ReadBack& read, const MachineDefinition& machine) {
+  std::vector<double> times;
+  times.reserve(read.moves.size());
+  double time = 0.0;
+  JointVector from;
+  std::size_t event = 0;
+  for (std::size_t i = 0; i < read.moves.size(); ++i) {
+    for (; event < read.events.size() && read.events[event].before <= i; ++event)
+      time += read.events[event].seconds;
+    const auto& move = read.moves[i];
+    double step = move.duration;
+    if (move.rapid && from.size() > 0)
+      for (int j = 0; j < machine.size(); ++j)
+        step = std::max(step, std::abs(move.to[j] - from[j]) /
+                                  machine.axes[static_cast<std::size_t>(j)].velocity);
+    time += step;
+    times.push_back(time);
+    from = move.to;
+  }
+  return times;
+}
+
+/// The check with the largest value wins its place.
+class Worst {
+ public:
+  void see(double value, std::uint32_t output_line, double time, std::uint32_t input_line = 0) {
+    if (seen_ && value <= value_) return;
+    seen_ = true;
+    value_ = value;
+    output_line_ = output_line;
+    time_ = time;
+    input_line_ = input_line;
+  }
+  double value() const { return value_; }
+  Check check(std::string name, double limit, std::string unit) const {
+    Check c;
+    c.name = std::move(name);
+    c.value = value_;
+    c.limit = limit;
+    c.unit = std::move(unit);
+    c.ok = std::isfinite(value_) && value_ <= limit;
+    c.output_line = output_line_;
+    c.input_line = input_line_;
+    c.time_s = time_;
+    return c;
+  }
+
+ private:
+  bool seen_ = false;
+  double value_ = 0.0;
+  std::uint32_t output_line_ = 0;
+  std::uint32_t input_line_ = 0;
+  double time_ = 0.0;
+};
+
+void check_axes(const ReadBack& read, const MachineDefinition& machine,
+                const std::vector<double>& times, Verification& out) {
+  Checks velocity;
+  for (int j = 0; j < machine.size(); ++j) {
+    const AxisDefinition& axis = machine.axes[static_cast<std::size_t>(j)];
+    const double scale = display_scale(axis);
+    Worst share, speed;
+    AxisSummary summary;
+    summary.name = axis.name;
+    summary.unit = unit_of(axis);
+    bool first = true;
+    JointVector from;
+    const double mid = 0.5 * (axis.joint.lower + axis.joint.upper);
+    const double half = 0.5 * (axis.joint.upper - axis.joint.lower);
+    for (std::size_t i = 0; i < read.moves.size(); ++i) {
+      const ReadBackMove& move = read.moves[i];
+      if (move.known >> j & 1U) {
+        const double q = move.to[j];
+        share.see(std::abs(q - mid) / half, move.line, times[i]);
+        summary.position_low = first ? q * scale : std::min(summary.position_low, q * scale);
+        summary.position_high = first ? q * scale : std::max(summary.position_high, q * scale);
+        first = false;
+        if (!move.rapid && move.duration > 0.0 && from.size() > 0)
+          speed.see(std::abs(q - from[j]) / move.duration * scale, move.line, times[i]);
+      }
+      from = move.to;
+    }
+    summary.peak_velocity = speed.value();
+    summary.limit_velocity = axis.velocity * scale;
+    summary.limit_acceleration = axis.acceleration * scale;
+    summary.limit_jerk = axis.jerk * scale;
+    summary.source = source_name(axis.source);
+    Check position = share.check("position_limit." + axis.name, 1.0, "share of range");
+    position.ok = position.value <= 1.0 + 1e-12;
+    out.checks.push_back(position);
+    Check v = speed.check("velocity_limit." + axis.name, summary.limit_velocity,
+                          summary.unit + "/s");
+    v.planned = true;
+    velocity.push_back(v);
+    out.axes.push_back(std::move(summary));
+  }
+  out.checks.insert(out.checks.end(), velocity.begin(), velocity.end());
+}
+
+Check rule(std::string name, double value, std::string unit, std::uint32_t line, std::string note) {
+  Check c;
+  c.name = std::move(name);
+  c.value = value;
+  c.limit = 0.0;
+  c.unit = std::move(unit);
+  c.ok = value <= 0.0;
+  c.output_line = line;
+  c.note = c.ok ? "" : std::move(note);
+  return c;
+}
+
+void check_beam(const ReadBack& read, Checks& checks) {
+  double rapids = 0.0, ends = 0.0, dwells = 0.0;
+  std::uint32_t rapid_line = 0, end_line = 0, dwell_line = 0;
+  bool beam = false, moved_since_on = true;
+  std::size_t event = 0;
+  const auto take_events = [&](std::size_t before) {
+    for (; event < read.events.size() && read.events[event].before <= before; ++event) {
+      const ReadBackEvent& e = read.events[event];
+      if (e.beam && !beam) moved_since_on = false;
+      beam = e.beam;
+      // A dwell between beam on and the first motion is the pierce.
+      const bool waits = e.name == "dwell" || e.name == event_name::kStop ||
+                         e.name == event_name::kOptionalStop;
+      const bool pierce = e.name == "dwell" && !moved_since_on;
+      if (waits && beam && !pierce) {
+        dwells += e.name == "dwell" ? e.seconds : 1.0;
+        if (dwell_line == 0) dwell_line = e.line;
+      }
+    }
+  };
+  for (std::size_t i = 0; i < read.moves.size(); ++i) {
+    take_events(i);
+    const ReadBackMove& move = read.moves[i];
+    if (move.beam && move.rapid) {
+      ++rapids;
+      if (rapid_line == 0) rapid_line = move.line;
+    }
+    if (i == 0 && move.beam) {
+      ++ends;
+      end_line = move.line;
+    }
+    moved_since_on = true;
+  }
+  take_events(read.moves.size());
+  if (beam) {
+    ++ends;
+    end_line = read.last_line;
+  }
+  checks.push_back(rule("beam_off_in_rapid", rapids, "moves", rapid_line,
+                        "the beam is on during a rapid move: turn it off before"));
+  checks.push_back(rule("beam_off_at_start_and_end", ends, "ends", end_line,
+                        "the beam is on before the first or after the last motion"));
+  checks.push_back(rule("beam_dwell", dwells, "s", dwell_line,
+                        "the beam is on while the machine waits, and this is no pierce"));
+}
+
+}  // namespace
+
+Verification verify_machine(const ReadBack& read, const MachineDefinition& machine) {
+  Verification out;
+  const std::vector<double> times = move_times(read, machine);
+  out.scheduled_time = times.empty() ? 0.0 : times.back();
+  check_axes(read, machine, times, out);
+  if (has_beam(machine)) check_beam(read, out.checks);
+  if (machine.dialect.offset_guard)
+    out.checks.push_back(rule("offset_guard", read.offset_guard ? 0.0 : 1.0, "missing", 0,
+                              "the guard against live offsets is missing or was changed"));
+  out.checks.push_back(rule("exact_path", read.exact_path ? 0.0 : 1.0, "missing", 0,
+                            "the controller may blend between blocks by an amount without a bound: set "
+                            "dialect.path_mode = \"exact\""));
+  return out;
+}
+
+namespace {
+
+class DeviationCheck {
+ public:
+  DeviationCheck(const ReadBack& read, const MachineDefinition& machine, const DeviationInput& input)
+      : read_(read), machine_(machine), in_(input), times_(move_times(read, machine)) {}
+
+  Checks run(const Progress& progress) {
+    Checks checks;
+    check_map();
+    if (broken_.empty()) {
+      for (std::size_t i = 0; i < read_.moves.size(); ++i) {
+        if (in_.map[i].role == MoveRole::path) compare_block(i);
+        compare_joints(i);
+        if (i % 4096 == 0 &&
+            !progress("verify", static_cast<double>(i) / static_cast<double>(read_.moves.size())))
+          break;
+      }
+      checks.push_back(tip_.check("tip_deviation", machine_.tolerance.tip, "mm"));
+      checks.push_back(axis_.check("axis_deviation",
+                                   degrees_from_radians(machine_.tolerance.axis), "deg"));
+      add_round_trip(checks);
+    }
+    if (has_beam(machine_)) check_beam_in_links(checks);
+    Check complete;
+    complete.name = "path_complete";
+    complete.unit = "faults";
+    complete.ok = broken_.empty();
+    complete.value = broken_.empty() ? 0.0 : 1.0;
+    complete.note = broken_;
+    complete.output_line = broken_line_;
+    checks.push_back(complete);
+    return checks;
+  }
+
+ private:
+  // Every motion of the text is one entry of the map, in order, and the entries of the input's segments
+  // follow each other without a gap from the first to the last.
+  void check_map() {
+    if (read_.moves.size() != in_.map.size())
+      return broken(0, "the program has " + std::to_string(read_.moves.size()) + " motions, planned were " +
+                           std::to_string(in_.map.size()));
+    if (!in_.map.empty() && in_.map.front().role == MoveRole::path)
+      return broken(in_.map.front().output_line, "the way to the first point is missing");
+    std::size_t segment = 0;
+    double share = 1.0;
+    for (std::size_t i = 0; i < in_.map.size(); ++i) {
+      const LineMapEntry& e = in_.map[i];
+      if (read_.moves[i].line != e.output_line)
+        return broken(read_.moves[i].line, "a motion stands on another line than planned");
+      if (e.role != MoveRole::path) continue;
+      while (share == 1.0 && segment + 1 < e.segment &&
+             in_.reference.path().points[segment + 1].replanned)
+        ++segment;
+      const bool next = share == 1.0 && e.segment == segment + 1 && e.from_share == 0.0;
+      const bool goes_on = e.segment == segment && e.from_share == share && share < 1.0;
+      if (!next && !goes_on) return broken(e.output_line, "a part of the tool path is missing or doubled");
+      if (!(e.to_share > e.from_share)) return broken(e.output_line, "a block goes backwards");
+      segment = e.segment;
+      share = e.to_share;
+    }
+    while (share == 1.0 && segment < in_.reference.segments() &&
+           in_.reference.path().points[segment + 1].replanned)
+      ++segment;
+    if (segment != in_.reference.segments() || share != 1.0)
+      broken(0, "the end of the tool path is missing");
+  }
+
+  void broken(std::uint32_t line, std::string why) {
+    broken_ = std::move(why);
+    broken_line_ = line;
+  }
+
+  void compare_block(std::size_t i) {
+    const LineMapEntry& e = in_.map[i];
+    const ReadBackMove& move = read_.moves[i];
+    const JointVector& from = read_.moves[i - 1].to;
+    const double tool_length = in_.reference.path().points[e.segment].tool_length;
+    const double span = e.to_share - e.from_share;
+    const auto own = second_derivative_bound(in_.chain, from, move.to);
+    const auto input = in_.reference.second_derivative_bound(e.segment);
+    const double tip_bend = own.tip + tool_length * own.axis + span * span * input.tip;
+    const double axis_bend = own.axis + span * span * input.axis;
+    const int steps = steps_for(tip_bend, axis_bend);
+    const double h2 = 1.0 / (8.0 * steps * steps);
+    for (int k = 0; k <= steps; ++k) {
+      const double t = static_cast<double>(k) / steps;
+      const CutterLocation wanted = in_.reference.at(e.segment, e.from_share + t * span);
+      const CutterLocation holder = forward_location(in_.chain, from + t * (move.to - from));
+      const Vec3 tip = holder.tip - tool_length * holder.axis;
+      tip_.see((tip - wanted.tip).norm() + h2 * tip_bend, move.line, times_[i], e.input_line);
+      const double chord = (holder.axis - wanted.axis).norm() + h2 * axis_bend;
+      axis_.see(degrees_from_radians(2.0 * std::asin(std::min(1.0, 0.5 * chord))), move.line, times_[i],
+                e.input_line);
+    }
+  }
+
+  // So many that the allowance between samples is at most a fiftieth of the tolerance.
+  int steps_for(double tip_bend, double axis_bend) const {
+    const double share = std::max(tip_bend / (0.02 * 8.0 * machine_.tolerance.tip),
+                                  axis_bend / (0.02 * 8.0 * machine_.tolerance.axis));
+    return static_cast<int>(std::clamp(std::ceil(std::sqrt(share)), 2.0, 512.0));
+  }
+
+  void compare_joints(std::size_t i) {
+    const MachineMove& planned = in_.planned.moves[i];
+    for (int j = 0; j < machine_.size(); ++j)
+      if (planned.joints >> j & 1U)
+        joints_[static_cast<std::size_t>(j)].see(
+            std::abs(planned.to[j] - read_.moves[i].to[j]) *
+                display_scale(machine_.axes[static_cast<std::size_t>(j)]),
+            read_.moves[i].line, times_[i], planned.input_line);
+  }
+
+  void add_round_trip(Checks& checks) const {
+    for (int j = 0; j < machine_.size(); ++j) {
+      const auto& axis = machine_.axes[static_cast<std::size_t>(j)];
+      const bool inch = machine_.dialect.units == "inch";
+      const int digits = is_rotary(axis) ? machine_.dialect.digits_angle : machine_.dialect.digits_length;
+      const double unit = is_rotary(axis) || !inch ? 1.0 : kMillimetresPerInch;
+      const double half_digit = 0.5 * std::pow(10.0, -digits) * unit;
+      checks.push_back(joints_[static_cast<std::size_t>(j)].check("round_trip." + axis.name,
+                                                                  half_digit * (1.0 + 1e-6),
+                                                                  unit_of(axis)));
+    }
+  }
+
+  void check_beam_in_links(Checks& checks) const {
+    double count = 0.0;
+    std::uint32_t line = 0;
+    for (std::size_t i = 0; i < std::min(read_.moves.size(), in_.map.size()); ++i)
+      if (in_.map[i].role == MoveRole::link && read_.moves[i].beam) {
+        ++count;
+        if (line == 0) line = read_.moves[i].line;
+      }
+    checks.push_back(rule("beam_off_in_link", count, "moves", line,
+                          "the beam is on during a link between cuts"));
+  }
+
+  const ReadBack& read_;
+  const MachineDefinition& machine_;
+  const DeviationInput& in_;
+  std::vector<double> times_;
+  Worst tip_, axis_;
+  std::array<Worst, kMaxJoints> joints_;
+  std::string broken_;
+  std::uint32_t broken_line_ = 0;
+};
+
+}  // namespace
+
+Checks verify_deviation(const ReadBack& read, const MachineDefinition& machine,
+                        const DeviationInput& input, const Progress& progress) {
+  return DeviationCheck(read, machine, input).run(progress);
+}
+
+std::vector<CutterLocation> beam_locations(const ReadBack& read, const ScrewChain& chain) {
+  std::vector<CutterLocation> locations;
+  for (std::size_t i = 1; i < read.moves.size(); ++i) {
+    if (!read.moves[i].beam) continue;
+    const JointVector& from = read.moves[i - 1].to;
+    for (const double t : {0.0, 0.5, 1.0})
+      if (t > 0.0 || !read.moves[i - 1].beam)
+        locations.push_back(forward_location(chain, from + t * (read.moves[i].to - from)));
+  }
+  return locations;
+}
+
+}  // namespace smoothpost

@@ -1,0 +1,169 @@
+#include "postproc/report/report_json.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "machines/dialects/decimal.h"
+
+namespace smoothpost {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Nine significant digits are more than any check needs and the same on every machine.
+Json number(double value) {
+  if (!std::isfinite(value)) return nullptr;
+  if (value == 0.0) return 0.0;
+  const int magnitude = static_cast<int>(std::floor(std::log10(std::abs(value))));
+  const double scale = std::pow(10.0, 8 - magnitude);
+  const double rounded = std::round(value * scale) / scale;
+  return std::isfinite(rounded) ? rounded : value;
+}
+
+Json check_json(const Check& c) {
+  Json j = {{"name", c.name}, {"value", number(c.value)}, {"limit", number(c.limit)}, {"unit", c.unit},
+            {"ok", c.ok},     {"planned", c.planned},     {"input_line", c.input_line},
+            {"output_line", c.output_line}, {"time_s", number(c.time_s)}};
+  if (!c.note.empty()) j["note"] = c.note;
+  return j;
+}
+
+Json diagnostic_json(const Diagnostic& d) {
+  return {{"file", d.where.file},   {"line", d.where.line}, {"column", d.where.column},
+          {"severity", to_string(d.severity)}, {"code", d.code}, {"text", d.text}};
+}
+
+Json axis_json(const AxisSummary& a) {
+  // Acceleration and jerk of a program at level geometry are the controller's: null, not zero.
+  return {{"name", a.name},
+          {"unit", a.unit},
+          {"position", {number(a.position_low), number(a.position_high)}},
+          {"peak", {{"velocity", number(a.peak_velocity)}, {"acceleration", nullptr}, {"jerk", nullptr}}},
+          {"limit",
+           {{"velocity", number(a.limit_velocity)},
+            {"acceleration", number(a.limit_acceleration)},
+            {"jerk", number(a.limit_jerk)},
+            {"source", a.source}}}};
+}
+
+std::string dump(const Json& json) {
+  // Invalid UTF-8 in a comment or file name must not lose the report.
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace
+
+std::string report_json(const Conversion& c, const ReportContext& context) {
+  Json checks = Json::array();
+  for (const auto& check : c.checks) checks.push_back(check_json(check));
+  Json axes = Json::array();
+  for (const auto& axis : c.axes) axes.push_back(axis_json(axis));
+  Json diagnostics = Json::array();
+  for (const auto& d : c.diagnostics) diagnostics.push_back(diagnostic_json(d));
+
+  Json j;
+  j["schema"] = 1;
+  j["tool"] = {{"name", "smoothpost"}, {"version", context.version}};
+  j["machine"] = context.machine;
+  j["dialect"] = context.dialect;
+  j["verdict"] = to_string(c.verdict);
+  j["certificate"] = {
+      {"level", c.level},
+      {"interpolation", c.interpolation},
+      {"reference", c.reference},
+      {"assumes", c.assumes},
+      {"not_checked", c.not_checked},
+      {"budget_mm",
+       {{"merge", number(c.budget_mm.merge)},
+        {"smoothing", number(c.budget_mm.smoothing)},
+        {"chord", number(c.budget_mm.chord)},
+        {"rounding", number(c.budget_mm.rounding)},
+        {"controller", number(c.budget_mm.controller)}}},
+      {"input_sha256", context.input_sha256},
+      {"program_sha256", context.program_sha256},
+      {"machine_sha256", context.machine_sha256}};
+  j["input"] = {{"file", context.input_file},     {"format", context.input_format},
+                {"dialect", context.input_dialect}, {"lines", context.input_lines},
+                {"cuts", c.cuts},                 {"links", c.links},
+                {"cutter_locations", context.cutter_locations}, {"length_mm", number(c.length)}};
+  j["output"] = {{"lines", std::count(c.program.begin(), c.program.end(), '\n')},
+                 {"blocks", c.blocks},
+                 {"bytes", c.program.size()}};
+  j["checks"] = std::move(checks);
+  j["axes"] = std::move(axes);
+  j["time_s"] = {{"programmed", number(c.programmed_time)}, {"scheduled", number(c.scheduled_time)}};
+  j["diagnostics"] = std::move(diagnostics);
+  if (context.timings) {
+    Json stages = Json::array();
+    for (const auto& stage : c.stages)
+      stages.push_back({{"name", stage.name}, {"seconds", number(stage.seconds)}});
+    j["stages"] = std::move(stages);
+  }
+  return dump(j);
+}
+
+std::string line_map_json(const LineMap& map, const std::string& input_file) {
+  // Written by hand: a million rows as a JSON tree would cost a hundred times their text.
+  std::string text = "{\"schema\": 1, \"input\": " +
+                     Json(input_file).dump(-1, ' ', false, Json::error_handler_t::replace) +
+                     ",\n\"columns\": [\"output_line\", \"input_line\", \"role\", \"segment\", "
+                     "\"from\", \"to\"],\n\"rows\": [";
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    const LineMapEntry& e = map[i];
+    text += i ? ",\n[" : "\n[";
+    text += std::to_string(e.output_line) + "," + std::to_string(e.input_line) +
+            (e.role == MoveRole::path ? ",\"path\"," : ",\"link\",") + std::to_string(e.segment) + ",";
+    append_decimal(text, e.from_share, 9);
+    text += ',';
+    append_decimal(text, e.to_share, 9);
+    text += ']';
+  }
+  return text + "\n]}\n";
+}
+
+std::string diagnostics_json(const Diagnostics& diagnostics) {
+  Json list = Json::array();
+  for (const auto& d : diagnostics) list.push_back(diagnostic_json(d));
+  return dump(list);
+}
+
+std::string changed_checks(const std::string& expected_report, const std::string& actual_report,
+                           double relative) {
+  const Json before = Json::parse(expected_report, nullptr, false);
+  const Json after = Json::parse(actual_report, nullptr, false);
+  if (before.is_discarded() || after.is_discarded()) {
+    return expected_report == actual_report ? "" : "    a report is missing or no JSON\n";
+  }
+  const auto row = [](const Json& check) {
+    return check.value("value", Json(nullptr)).dump() + (check.value("ok", false) ? " ok" : " FAILED");
+  };
+  const auto find = [](const Json& report, const std::string& name) {
+    for (const auto& check : report.value("checks", Json::array()))
+      if (check.value("name", "") == name) return check;
+    return Json(nullptr);
+  };
+  const auto close = [&](const Json& a, const Json& b) {
+    if (a.value("ok", false) != b.value("ok", true)) return false;
+    if (!a["value"].is_number() || !b["value"].is_number()) return a["value"] == b["value"];
+    const double x = a["value"].get<double>(), y = b["value"].get<double>();
+    const double scale = std::max({std::abs(a.value("limit", 0.0)), std::abs(x), std::abs(y)});
+    return std::abs(x - y) <= relative * scale;
+  };
+  std::string text;
+  if (before.value("verdict", "") != after.value("verdict", ""))
+    text += "    verdict: expected " + before.value("verdict", "") + ", now " + after.value("verdict", "") + "\n";
+  for (const auto& a : before.value("checks", Json::array())) {
+    const std::string name = a.value("name", "");
+    const Json b = find(after, name);
+    if (b.is_null()) text += "    " + name + ": expected " + row(a) + ", now absent\n";
+    else if (!close(a, b)) text += "    " + name + ": expected " + row(a) + ", now " + row(b) + "\n";
+  }
+  for (const auto& b : after.value("checks", Json::array()))
+    if (find(before, b.value("name", "")).is_null())
+      text += "    " + b.value("name", "") + ": new, " + row(b) + "\n";
+  return text;
+}
+
+}  // namespace smoothpost

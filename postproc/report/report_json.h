@@ -1,0 +1,41 @@
+#pragma once
+
+#include <string>
+
+#include "postproc/pipeline/convert.h"
+
+namespace smoothpost {
+
+/// What the report says besides the conversion itself.
+struct ReportContext {
+  std::string version;
+  std::string machine;
+  std::string dialect;
+  std::string input_file;
+  std::string input_format;
+  std::string input_dialect;
+  std::size_t input_lines = 0;
+  std::size_t cutter_locations = 0;
+  std::string input_sha256;
+  std::string program_sha256;
+  std::string machine_sha256;
+  bool timings = false;
+};
+
+/// The JSON report, schema 1 (docs/report.md). Numbers that are not finite become null; the same
+/// conversion gives the same bytes, `stages` only when context.timings.
+std::string report_json(const Conversion& conversion, const ReportContext& context);
+
+/// The line map: one row [output line, input line, "path"|"link", segment, from, to] per motion.
+std::string line_map_json(const LineMap& map, const std::string& input_file);
+
+/// A table of the checks in which two reports differ: name, expected and actual value and verdict. Values
+/// that differ by at most `relative` of the limit (or of the value, when the limit is 0) count as equal.
+/// Empty when there is none; one line when a report cannot be read.
+std::string changed_checks(const std::string& expected_report, const std::string& actual_report,
+                           double relative);
+
+/// Diagnostics as a JSON array, for --diagnostics json.
+std::string diagnostics_json(const Diagnostics& diagnostics);
+
+}  // namespace smoothpost

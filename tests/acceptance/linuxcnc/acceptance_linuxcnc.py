@@ -1,0 +1,218 @@
+#!/usr/bin/python3
+"""Acceptance of one conversion by LinuxCNC itself.
+
+    acceptance_linuxcnc.py CASE --smoothpost TOOL --source ROOT --work DIR
+
+CASE is a row of CASES: an input program is converted with the built tool, then
+  1. the tool certifies it (exit status 0, verdict certified),
+  2. LinuxCNC's interpreter accepts the program, and refuses it with any live G54 offset,
+  3. the program runs to its end in the headless LinuxCNC that make_config.py makes of the machine,
+  4. the executed poses and the program agree: tip 0.01 mm, axis 0.05 deg, blending included; every
+     row of the trajectory CSV was executed; its tips and axes are those of our forward kinematics,
+  5. digital output 0 (the beam) is where the program wants it, never on in a rapid, off at the end,
+  6. with a live G54 offset in the controller the program aborts before any joint has moved.
+Prints every figure. Exit status: 0 all hold, 1 not, 2 usage, 77 LinuxCNC cannot run here (and why).
+"""
+import argparse
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+
+import interpreter_check
+from compare_path import Comparison, Log, Plan, Trajectory, block_of_samples, compare, report
+from joint_program import JointProgram
+from machine_model import Machine, axis_angle_deg, fail
+from make_config import write_config
+from run_program import SKIP, reason_to_skip, run_program
+
+TOLERANCE = (0.01, 0.05)  # mm, deg
+OPERATOR_ERROR = 15       # exit status of headless_display.py
+BEAM_SWITCH = 0.004       # s, between a switch of the output and the joints' start
+LIVE_OFFSET = 0.25        # mm or deg
+SAMPLES = "tests/acceptance/linuxcnc/samples"
+
+# The mills' home is far above the work; it is moved near, to keep the runs to seconds.
+MILL = {"input": f"{SAMPLES}/mill_short.ngc", "input_machine": "table_table_ac",
+        "options": ["--tool", "1=50"], "tool_length": 50.0,
+        "set": {"axis.Z.home": 150, "links.retract_mm": 150}}
+CASES = {
+    "mill_to_table_table_ac": {**MILL, "machine": "table_table_ac"},
+    "mill_to_table_table_bc": {**MILL, "machine": "table_table_bc"},
+    "laser_to_laser_5p1": {"input": f"{SAMPLES}/laser_short.ngc", "input_machine": "laser_5p1",
+                           "machine": "laser_5p1", "options": [], "tool_length": 0.0, "set": {}},
+}
+
+
+class Verdicts:
+    """Collects what holds and what does not, and says it."""
+
+    def __init__(self):
+        self.failed = []
+
+    def that(self, holds, text):
+        print(f"{'ok    ' if holds else 'FAILED'} {text}", flush=True)
+        if not holds:
+            self.failed.append(text)
+        return holds
+
+
+class Acceptance:
+    """One case: its files, its machine, its verdicts."""
+
+    def __init__(self, case, arguments):
+        self.case = case
+        self.tool, self.source, self.work = arguments.smoothpost, arguments.source, arguments.work
+        os.makedirs(self.work, exist_ok=True)
+        self.machine = Machine(self.machine_file(case["machine"]))
+        for axis in self.machine.axes:
+            axis.home = case["set"].get(f"axis.{axis.name}.home", axis.home)
+        self.program = os.path.join(self.work, "program.ngc")
+        self.trajectory = os.path.join(self.work, "trajectory.csv")
+        self.json = os.path.join(self.work, "report.json")
+        self.verdicts = Verdicts()
+        self.that = self.verdicts.that
+
+    def machine_file(self, name):
+        return os.path.join(self.source, "machines", name, "machine.toml")
+
+    def forward(self, joints):
+        return self.machine.forward(joints, self.case["tool_length"])
+
+    def compared(self, log, plan):
+        return Comparison(log, self.machine, plan, TOLERANCE, self.case["tool_length"])
+
+    def convert(self):
+        case = self.case
+        command = [self.tool, "convert", os.path.join(self.source, case["input"]),
+                   "-m", self.machine_file(case["machine"]),
+                   "--input-machine", self.machine_file(case["input_machine"]),
+                   "-o", self.program, "--json", self.json, "--trajectory", self.trajectory,
+                   "--progress", "none", *case["options"]]
+        for key, value in case["set"].items():
+            command += ["--set", f"{key}={value}"]
+        for path in (self.program, self.trajectory, self.json):
+            if os.path.exists(path):
+                os.remove(path)
+        print("$", " ".join(command), flush=True)
+        run = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+        print(run.stderr, end="")
+        if not self.that(run.returncode == 0, f"convert: exit status {run.returncode}"):
+            return False
+        with open(self.json, encoding="utf-8") as file:
+            verdict = json.load(file).get("verdict")
+        return self.that(verdict == "certified", f"verdict {verdict}")
+
+    def interpreter(self):
+        checker = interpreter_check.Checker(self.machine, {}, {})
+        self.that(checker.check(self.program), "LinuxCNC's interpreter accepts the program")
+        for letter in self.machine.letters + "R":
+            checker = interpreter_check.Checker(self.machine, {}, {letter: LIVE_OFFSET})
+            motions, _, errors = checker.module(self.program)
+            told = "; ".join(errors) or "NOT refused"
+            self.that(bool(errors) and motions == 0, f"interpreter, G54 {letter}{LIVE_OFFSET}: {told}")
+
+    def run(self, name, **offsets):
+        """Exit status and log of one run."""
+        config = os.path.join(self.work, f"config_{name}")
+        log = os.path.join(self.work, f"log_{name}.txt")
+        write_config(self.machine, config, "triv", **offsets)
+        return run_program(config, self.program, log, timeout=90.0), log
+
+    def execution(self):
+        status, path = self.run("plain")
+        if not self.that(status == 0, f"run in the headless LinuxCNC: status {status}"):
+            return
+        within, result = compare(path, self.machine, self.program, TOLERANCE,
+                                 self.case["tool_length"])
+        self.that(within, "executed path against the program")
+        self.that(result.planned > 0.0, f"the program holds {result.planned:.3f} s of feed motion")
+        log = Log(path, self.machine)
+        self.control(log)
+        self.beam(log)
+        trajectory = Trajectory(self.trajectory, self.machine)
+        plan = Plan.of_trajectory(trajectory)
+        print("against the trajectory CSV:")
+        self.that(report(self.compared(log, plan), plan, TOLERANCE),
+                  "every row of the trajectory CSV was executed")
+        tip, axis = self.forward(trajectory.joints)
+        tip_error = float(np.max(np.linalg.norm(tip - trajectory.tip, axis=1)))
+        axis_error = float(np.max(axis_angle_deg(axis, trajectory.axis)))
+        self.that(tip_error < 1e-4 and axis_error < 1e-4,
+                  f"CSV against our forward kinematics: {tip_error:.1e} mm, {axis_error:.1e} deg")
+
+    def control(self, log):
+        """The comparison itself is checked: a plan 3 tolerances beside in one axis must be over."""
+        for index, axis in enumerate(self.machine.axes):
+            plan = Plan.of_program(self.program, self.machine, log.joints[0])
+            middle = len(plan.joints) // 2
+            tip, tool = self.forward(plan.joints[middle:])
+            step, share = 0.01, 3.0
+            for _ in range(2):  # the second round with the step that the first one found
+                step *= 3.0 / share
+                moved = plan.joints[middle:].copy()
+                moved[:, index] += step
+                tip_moved, tool_moved = self.forward(moved)
+                share = max(float(np.max(np.linalg.norm(tip_moved - tip, axis=1))) / TOLERANCE[0],
+                            float(np.max(axis_angle_deg(tool_moved, tool))) / TOLERANCE[1])
+            plan.joints[middle:] = moved
+            result = self.compared(log, plan)
+            seen = max(max(side.tip / TOLERANCE[0], side.axis / TOLERANCE[1])
+                       for side in (result.executed, result.covered))
+            self.that(seen > 1.0, f"control: {axis.name} {step:.4f} {axis.unit} beside is seen as "
+                                  f"{seen:.1f} tolerances")
+
+    def beam(self, log):
+        moves = JointProgram(self.program, self.machine.letters, log.joints[0]).moves
+        planned = np.array([move.beam for move in moves], bool)
+        plan = Plan.of_program(self.program, self.machine, log.joints[0])
+        on = log.output[0]
+        self.that(not on[-1], "output 0 is off at the end")
+        tip, _ = self.forward(log.joints)
+        travel = np.r_[np.linalg.norm(np.diff(tip, axis=0), axis=1), 0.0]
+        in_rapid = float(np.sum(travel[on & (log.motion_type == 1)]))
+        self.that(in_rapid <= TOLERANCE[0],
+                  f"tip travel with output 0 on in a rapid: {in_rapid:.5f} mm")
+        moving = log.moving()
+        wrong = int(np.count_nonzero((on != planned[block_of_samples(log, plan)])[moving]))
+        switches = int(np.count_nonzero(np.diff(planned)))
+        self.that(wrong <= round(1000 * BEAM_SWITCH) * switches,
+                  f"output 0 is not as programmed for {wrong} ms at {switches} switches")
+        if "beam_on" in self.machine.events:
+            self.that(bool(np.any(on)), f"output 0 is on for {np.count_nonzero(on)} ms")
+
+    def guard(self):
+        for letter in (self.machine.letters[0], self.machine.letters[-1]):
+            status, path = self.run(f"g54_{letter}", g54={letter: LIVE_OFFSET})
+            self.that(status == OPERATOR_ERROR, f"run, G54 {letter}{LIVE_OFFSET}: status {status}")
+            log = Log(path, self.machine)
+            left = np.abs(log.joints - self.machine.home())
+            self.that(left.size > 0 and float(np.max(left)) <= 1e-6,
+                      f"run, G54 {letter}{LIVE_OFFSET}: no joint left home in {len(left)} ms")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("case", choices=sorted(CASES))
+    parser.add_argument("--smoothpost", required=True)
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--work", required=True)
+    arguments = parser.parse_args()
+    reason = reason_to_skip() or interpreter_check.reason_to_skip()
+    if reason:
+        fail(f"skipped: {reason}", SKIP)
+    acceptance = Acceptance(CASES[arguments.case], arguments)
+    verdicts = acceptance.verdicts
+    if acceptance.convert():
+        acceptance.interpreter()
+        acceptance.execution()
+        acceptance.guard()
+    print(f"{arguments.case}: "
+          f"{f'{len(verdicts.failed)} checks FAILED' if verdicts.failed else 'accepted'}")
+    sys.exit(1 if verdicts.failed else 0)
+
+
+if __name__ == "__main__":
+    main()

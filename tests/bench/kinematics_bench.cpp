@@ -1,0 +1,196 @@
+#include <benchmark/benchmark.h>
+
+#include <chrono>
+#include <cmath>
+#include <vector>
+
+#include "kernels/kinematics/branch_tracking.h"
+#include "kernels/kinematics/rotary_pair.h"
+#include "kernels/kinematics/screw_chain.h"
+#include "tests/kernels/kinematics/reference_machines.h"
+
+// Kinematics of a five-axis machine beside its floor: the libm calls that the same work cannot do
+// without, measured in the same run. Counters: ns per call, ns of the floor, and their ratio.
+namespace smoothpost {
+namespace {
+
+constexpr std::size_t kPoses = 4096;  // a power of two; small enough for the second-level cache
+
+/// Elementary functions that a computation needs.
+struct Calls {
+  int sine_cosine = 0;  ///< pairs
+  int atan2 = 0;
+  int sqrt = 0;
+};
+
+double nanoseconds(std::chrono::steady_clock::duration elapsed, std::size_t count) {
+  return std::chrono::duration<double, std::nano>(elapsed).count() / static_cast<double>(count);
+}
+
+/// Least of nine measurements of those calls alone, on arguments that change from call to call.
+double floor_ns(const Calls& calls) {
+  std::vector<double> arguments(kPoses);
+  test::Random random(51);
+  for (double& a : arguments) a = random.between(0.1, 3.0);
+  double best = 1e300;
+  for (int repeat = 0; repeat < 9; ++repeat) {
+    const auto start = std::chrono::steady_clock::now();
+    double sum = 0.0;
+    for (std::size_t i = 0; i < kPoses; ++i) {
+      double a = arguments[i];
+      for (int k = 0; k < calls.sine_cosine; ++k) {
+        sum += std::sin(a) + std::cos(a);
+        a += 0.01;
+      }
+      for (int k = 0; k < calls.atan2; ++k) {
+        sum += std::atan2(a, 1.7 - a);
+        a += 0.01;
+      }
+      for (int k = 0; k < calls.sqrt; ++k) {
+        sum += std::sqrt(a);
+        a += 0.01;
+      }
+    }
+    benchmark::DoNotOptimize(sum);
+    best = std::min(best, nanoseconds(std::chrono::steady_clock::now() - start, kPoses));
+  }
+  return best;
+}
+
+/// Runs `work(i)` as the benchmark and reports it beside its floor.
+template <typename Work>
+void beside_floor(benchmark::State& state, const Calls& calls, const Work& work) {
+  const double floor = floor_ns(calls);
+  std::size_t i = 0;
+  const auto start = std::chrono::steady_clock::now();
+  for (auto _ : state) {
+    work(i);
+    i = (i + 1) % kPoses;
+  }
+  const double each = nanoseconds(std::chrono::steady_clock::now() - start,
+                                  static_cast<std::size_t>(state.iterations()));
+  state.counters["ns"] = each;
+  state.counters["floor_ns"] = floor;
+  state.counters["ratio"] = each / floor;
+}
+
+ScrewChain chain_by(std::int64_t index) {
+  return index == 0   ? test::table_table_ac()
+         : index == 1 ? test::laser(200.0)
+                      : test::table_table_b45c();
+}
+
+const char* name_by(std::int64_t index) {
+  return index == 0 ? "table_table_AC" : index == 1 ? "laser_5p1" : "table_table_B45C";
+}
+
+struct Poses {
+  ScrewChain chain;
+  std::vector<JointVector> q;
+  std::vector<CutterLocation> location;
+};
+
+Poses poses_of(std::int64_t index) {
+  Poses poses{chain_by(index), {}, {}};
+  test::Random random(52);
+  for (std::size_t i = 0; i < kPoses; ++i) {
+    poses.q.push_back(random.joints(poses.chain));
+    poses.location.push_back(forward_location(poses.chain, poses.q.back()));
+  }
+  return poses;
+}
+
+void closed_form_both_branches(benchmark::State& state) {
+  const Poses poses = poses_of(state.range(0));
+  const auto pair = RotaryPair::from(poses.chain);
+  state.SetLabel(name_by(state.range(0)));
+  beside_floor(state, {.sine_cosine = 0, .atan2 = 3, .sqrt = 6}, [&](std::size_t i) {
+    benchmark::DoNotOptimize(pair->solve(poses.location[i], poses.q[i]));
+  });
+}
+BENCHMARK(closed_form_both_branches)->DenseRange(0, 2);
+
+void forward_pose(benchmark::State& state) {
+  const Poses poses = poses_of(state.range(0));
+  state.SetLabel(name_by(state.range(0)));
+  beside_floor(state, {.sine_cosine = 2},
+               [&](std::size_t i) { benchmark::DoNotOptimize(forward(poses.chain, poses.q[i])); });
+}
+BENCHMARK(forward_pose)->DenseRange(0, 1);
+
+void forward_location_only(benchmark::State& state) {
+  const Poses poses = poses_of(state.range(0));
+  state.SetLabel(name_by(state.range(0)));
+  beside_floor(state, {.sine_cosine = 2}, [&](std::size_t i) {
+    benchmark::DoNotOptimize(forward_location(poses.chain, poses.q[i]));
+  });
+}
+BENCHMARK(forward_location_only)->DenseRange(0, 1);
+
+void geometric_jacobian(benchmark::State& state) {
+  const Poses poses = poses_of(state.range(0));
+  state.SetLabel(name_by(state.range(0)));
+  beside_floor(state, {.sine_cosine = 2},
+               [&](std::size_t i) { benchmark::DoNotOptimize(jacobian(poses.chain, poses.q[i])); });
+}
+BENCHMARK(geometric_jacobian)->DenseRange(0, 1);
+
+void curvature_bound(benchmark::State& state) {
+  const Poses poses = poses_of(state.range(0));
+  state.SetLabel(name_by(state.range(0)));
+  std::vector<JointVector> to;
+  for (std::size_t i = 0; i < kPoses; ++i) to.push_back(poses.q[i] * 0.999);
+  beside_floor(state, {.sine_cosine = 2, .sqrt = 12}, [&](std::size_t i) {
+    benchmark::DoNotOptimize(second_derivative_bound(poses.chain, poses.q[i], to[i]));
+  });
+}
+BENCHMARK(curvature_bound)->DenseRange(0, 1);
+
+/// Tilted rings, one a hundred points, joined by links; every fifth ring starts with an upright
+/// stretch.
+std::vector<TrackingPoint> rings(std::size_t count) {
+  std::vector<TrackingPoint> points;
+  points.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    TrackingPoint p;
+    const double azimuth = 2.0 * M_PI * static_cast<double>(i % 100) / 100.0;
+    const double tilt = (i / 100) % 5 == 0 && i % 100 < 20 ? 0.0 : 0.4;
+    p.location.tip =
+        Vec3(40.0 * std::cos(azimuth), 40.0 * std::sin(azimuth), 0.01 * double(i % 1000));
+    p.location.axis = Vec3(std::sin(tilt) * std::cos(azimuth), std::sin(tilt) * std::sin(azimuth),
+                           std::cos(tilt));
+    p.cut = i % 100 != 0;
+    p.line = static_cast<std::uint32_t>(i + 1);
+    points.push_back(p);
+  }
+  return points;
+}
+
+/// Whole paths under ±100 turns of the first rotary; the floor is the closed form's of one point.
+void track_path(benchmark::State& state) {
+  ScrewChain chain = test::table_table_ac();
+  chain.joints[4].lower = -200.0 * M_PI;
+  chain.joints[4].upper = 200.0 * M_PI;
+  const auto pair = RotaryPair::from(chain);
+  const auto points = rings(static_cast<std::size_t>(state.range(0)));
+  BranchTrackingSettings settings;
+  settings.held = JointVector::Zero(chain.size());
+  const double floor = floor_ns({.sine_cosine = 2, .atan2 = 3, .sqrt = 6});
+  const auto start = std::chrono::steady_clock::now();
+  for (auto _ : state) {
+    const BranchTracking result = track_branches(*pair, points, settings);
+    if (result.status != BranchTracking::Status::ok) state.SkipWithError(result.reason.c_str());
+    benchmark::DoNotOptimize(result.q.data());
+  }
+  const double each = nanoseconds(std::chrono::steady_clock::now() - start,
+                                  static_cast<std::size_t>(state.iterations()) * points.size());
+  state.counters["ns_per_point"] = each;
+  state.counters["floor_ns"] = floor;
+  state.counters["ratio"] = each / floor;
+}
+BENCHMARK(track_path)->Arg(10000)->Arg(1000000)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace smoothpost
+
+BENCHMARK_MAIN();
