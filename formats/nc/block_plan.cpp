@@ -275,19 +275,19 @@ void BlockPlanner::plan_m(const BlockWords& block, int slot, LetterMask& free) {
     action.kind = action.m == 428 ? ProcessAction::Kind::tcp_on : ProcessAction::Kind::tcp_off;
     return add_action(action);
   }
-  const EventMatch match = matcher_.match_m(action.m, block);
-  action.row = match.row;
-  if (match.row != nullptr) {
-    free &= ~match.used;
-    return add_action(action);
-  }
-  // A further M word of a row that another M word found.
+  // A further M word of a row that another M word of the block found says nothing of its own.
   for (int other = 0; other < block.m_count; ++other) {
     if (other == slot) continue;
     const EventMatch owner = matcher_.match_m(block.m[static_cast<std::size_t>(other)], block);
     if (owner.row == nullptr) continue;
     const auto& m = owner.row->m;
     if (std::find(m.begin(), m.end(), action.m) != m.end()) return;
+  }
+  const EventMatch match = matcher_.match_m(action.m, block);
+  action.row = match.row;
+  if (match.row != nullptr) {
+    free &= ~match.used;
+    return add_action(action);
   }
   if (settings_.process.unmapped == UnmappedWords::refuse) {
     refuse_unmapped(block, match, action.piece);

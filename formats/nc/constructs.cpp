@@ -72,13 +72,16 @@ ConstructSpan measure_letter(std::string_view rest) {
   if (rest[i] == '[') return {Construct::expression, to_length(behind_bracket(rest, i))};
   if (rest[i] == '#') return {Construct::parameter, to_length(behind_parameter(rest, i))};
   if (rest[i] == '=') return {Construct::assignment, length_to_comment(rest)};
-  std::size_t end = behind_number(rest, i);
+  const std::size_t end = behind_number(rest, i);
   if (end == i) return {Construct::letter_alone, 1};
   if (end < rest.size() && rest[end] == '=') {
     return {Construct::assignment, length_to_comment(rest)};
   }
-  if (end + 1 < rest.size() && (rest[end] == '-' || rest[end] == '+') && rest[end + 1] == '#') {
-    return {Construct::parameter, to_length(behind_parameter(rest, end + 1))};
+  if (end < rest.size() && rest[end] == '#') {
+    return {Construct::parameter, to_length(behind_parameter(rest, end))};
+  }
+  if (end < rest.size() && rest[end] == '[') {
+    return {Construct::expression, to_length(behind_bracket(rest, end))};
   }
   return {Construct::bad_number, to_length(end)};
 }

@@ -59,8 +59,9 @@ struct BranchTracking {
 ///  - is held through the run and, if it has to turn, turns on a motion of the run that does not
 ///    cut, the last one that serves; a run at the start of the path holds settings.held;
 ///  - goes linearly by motion from its value before to its value behind if all motions into, in and
-///    out of the run cut, so it is constant when they agree, as in an exact crossing of the pole
-///    (sign flip of the second rotary);
+///    out of the run cut (the motions into and out of it take part only where the others are too
+///    few), so it is constant when they agree, as in an exact crossing of the pole (sign flip of
+///    the second rotary);
 ///  - keeps its value at the end of the path.
 ///
 /// Guarantees (tests): cost of an exhaustive search on small paths; limits; continuity on cuts;

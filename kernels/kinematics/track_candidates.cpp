@@ -199,10 +199,12 @@ class CandidateBuilder {
   }
 
   /// The tracks that go linearly from a value before the run to one behind it, by up to a turn
-  /// either way.
+  /// either way: on the motions between points at the pole, or when these are too few also on the
+  /// motions into and out of the run.
   void add_through(std::size_t i, const RunEnd& before, const RunEnd& after) {
-    const auto motions = static_cast<double>(poles_.size() + 1);
-    const double share = static_cast<double>(i - run_begin_ + 1) / motions;
+    const auto count = static_cast<double>(poles_.size());
+    const auto place = static_cast<double>(i - run_begin_);
+    const double step = std::min(settings_.continuity, kPi);
     for (int pair = 0; pair < 4; ++pair) {
       const int b = pair / 2;
       const int c = pair % 2;
@@ -210,7 +212,10 @@ class CandidateBuilder {
       const double nearest = wrapped(after.first[c] - before.first[b]);
       for (int turn = -1; turn <= 1; ++turn) {
         const double whole = nearest + kTurn * turn;
-        if (std::abs(whole) > motions * std::min(settings_.continuity, kPi)) continue;
+        const bool inside = std::abs(whole) <= (count - 1.0) * step;
+        if (!inside && std::abs(whole) > (count + 1.0) * step) continue;
+        const double share =
+            inside ? place / std::max(count - 1.0, 1.0) : (place + 1.0) / (count + 1.0);
         const auto track = static_cast<std::uint8_t>(kThrough + 3 * pair + turn + 1);
         add_pole(i, {wrapped(before.first[b] + share * whole), 0.0, static_cast<std::uint8_t>(c),
                      track, false, false});

@@ -143,7 +143,12 @@ struct MachineDefinition {
 /// X_MT(0) has the tip as origin and the identity as rotation.
 ScrewChain chain_of(const MachineDefinition& machine, double tool_length = 0.0);
 
+/// Position range, velocity, acceleration and jerk of every axis, in machine-file order; mm or rad and s.
+/// limit_share is not applied. @pre size() ≤ kMaxJoints   @throws ContractViolation if not.
 JointLimits limits_of(const MachineDefinition& machine);
+
+/// Home position of every axis, in machine-file order; mm or rad.
+/// @pre size() ≤ kMaxJoints   @throws ContractViolation if not.
 JointVector home_of(const MachineDefinition& machine);
 
 }  // namespace smoothpost

@@ -299,6 +299,13 @@ class PathBuilder {
       assumes.push_back("the input was posted for machine " + settings_.machine->name);
     if (!compensates_ && out_.uses_tools)
       assumes.push_back("the program never activates a tool length: its coordinates are the tip's");
+    std::vector<std::uint32_t> unmapped;
+    for (const auto& e : out_.path.events)
+      if (e.kind == PathEvent::Kind::comment && e.text.rfind("unmapped: ", 0) == 0)
+        unmapped.push_back(e.line);
+    if (!unmapped.empty())
+      assumes.push_back("words without a mapping are comments that do nothing, on the user's word: lines " +
+                        line_list(unmapped));
     if (!lost_lines_.empty()) {
       note("the way to the first full position (up to line " + std::to_string(first_line_) +
            ") and over machine positions is re-planned: input lines " + line_list(lost_lines_));

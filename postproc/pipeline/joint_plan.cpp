@@ -95,9 +95,9 @@ class Planner {
   };
 
   void subdivide(std::size_t segment, const Node& from, const Node& to, int depth) {
-    // A full turn of a rotary has equal ends: look at the middle too before a long segment is accepted.
+    // A full turn of a rotary has equal ends: the input's own turn decides, not only what the ends show.
     const double mid_s = 0.5 * (from.s + to.s);
-    const bool may_turn = depth < 3 && turns_more_than_it_shows(segment);
+    const bool may_turn = total_turn(segment) * (to.s - from.s) > kRotaryStep;
     if (depth < kMaxSplits && (may_turn || too_far(from.location, to.location))) {
       const Node mid{mid_s, target(segment, mid_s)};
       subdivide(segment, from, mid, depth + 1);
@@ -107,9 +107,9 @@ class Planner {
     add_tracked(segment, to.s, to.location);
   }
 
-  bool turns_more_than_it_shows(std::size_t segment) const {
-    const double bound = reference_.second_derivative_bound(segment).axis;  // (total turn)²
-    return bound > kAxisStep * kAxisStep;
+  // A bound of the angle that the tool axis sweeps on a segment: the bound of |axis''| is its square.
+  double total_turn(std::size_t segment) const {
+    return std::sqrt(reference_.second_derivative_bound(segment).axis);
   }
 
   bool too_far(const CutterLocation& a, const CutterLocation& b) const {

@@ -220,8 +220,10 @@ class DeviationCheck {
         if (in_.map[i].role == MoveRole::path) compare_block(i);
         compare_joints(i);
         if (i % 4096 == 0 &&
-            !progress("verify", static_cast<double>(i) / static_cast<double>(read_.moves.size())))
+            !progress("verify", static_cast<double>(i) / static_cast<double>(read_.moves.size()))) {
+          broken(read_.moves[i].line, "cancelled before the whole program was compared");
           break;
+        }
       }
       checks.push_back(tip_.check("tip_deviation", machine_.tolerance.tip, "mm"));
       checks.push_back(axis_.check("axis_deviation",

@@ -179,8 +179,7 @@ def length_along(points):
 
 
 def blocks_by_length(points, pieces):
-    """For a plan without line numbers: the first and last block whose path length can be that of
-    each sample.
+    """The first and last block of each sample, for a plan without line numbers, by path length.
 
     Both sides are the same path when the comparison succeeds, so the lengths from the start agree
     but for the chords of the sampling.
@@ -235,8 +234,7 @@ class Comparison:
         self._times(plan, moving, block)
 
     def _cover(self, ends, points, bounds):
-        """Every block end of the plan: the nearest executed pose among the samples near that
-        block."""
+        """Finds for every block end of the plan the nearest executed pose near that block."""
         for index, end in enumerate(ends):
             first = int(np.searchsorted(bounds[1], index))
             last = int(np.searchsorted(bounds[0], index, side="right"))

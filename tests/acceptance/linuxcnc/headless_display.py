@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""The [DISPLAY] of a headless LinuxCNC: runs one program to its end while every servo cycle is
-logged.
+"""The [DISPLAY] of a headless LinuxCNC: runs one program while every servo cycle is logged.
 
 LinuxCNC starts it as `headless_display.py -ini FILE` and returns its exit status. Environment:
 SMOOTHPOST_PROGRAM, SMOOTHPOST_LOG, SMOOTHPOST_TIMEOUT (s). Exit status: 0 ran to its end, 10

@@ -6,14 +6,13 @@
 Each file goes through the interpreter twice: through the Python module `gcode` of the Debian
 package with the axes of the machine (all nine without --machine), and through `rs274 -g` where
 its axis words are within X Y Z A B C, the only ones that rs274 knows. Both start from a tool
-table with tools 0 to 99 and from zero offsets. A program passes when no block is refused, the
+table with tools 1 to 99 and from zero offsets. A program passes when no block is refused, the
 last block with motion was reached and the program end was executed.
 
 Prints a line per file: canonical motions, last line reached, errors. Exit status: 0 all accepted,
 1 a refusal, 2 usage, 77 LinuxCNC is not installed.
 """
 import argparse
-import ctypes
 import os
 import re
 import shutil
@@ -21,12 +20,13 @@ import subprocess
 import sys
 import tempfile
 
+from interpreter_worker import TOOLS
 from machine_model import Machine, fail
 from make_config import AXIS_ORDER, parameter_text, parse_assignments
 
 SKIP = 77
 RS274_AXES = "XYZABC"
-TOOLS = range(1, 100)
+WORKER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "interpreter_worker.py")
 MOTION_CODES = set("0 1 2 3 5 5.1 5.2 33 33.1 38.2 38.3 38.4 38.5 73 76 81 82 83 84 85 86 87 88 89"
                    .split())
 NO_MOTION_CODES = ("4", "10", "52", "92", "43.1", "43.2")  # their axis words do not move
@@ -64,120 +64,6 @@ def motion_lines(path):
     return lines, letters
 
 
-class Canon:
-    """What the interpreter calls: counts motions, holds a tool table, changes tools.
-
-    The interpreter reads its tools through get_tool(index) and expects the number of the tool,
-    nine offsets (inch and degrees), diameter, front and back angle, orientation. Index 0 is the
-    spindle, so change_tool has to put the tool there: with an empty slot T1 M6 and G43 H1 find no
-    tool.
-    """
-
-    def __init__(self, parameter_file, mask, lengths):
-        self.parameter_file = parameter_file
-        self.mask = mask
-        self.lengths = lengths
-        self.spindle = 0
-        self.line = 0
-        self.motions = 0
-        self.last_motion_line = 0
-        self.feed = 0.0
-        self.feedless_line = 0
-        self.tools_changed = []
-
-    def next_line(self, state):
-        self.line = state.sequence_number
-
-    def get_axis_mask(self):
-        return self.mask
-
-    def get_external_length_units(self):
-        return 1.0 / 25.4  # the module's lengths are inches
-
-    def get_external_angular_units(self):
-        return 1.0
-
-    def get_block_delete(self):
-        return 0
-
-    def get_tool(self, index):
-        number = self.spindle if index == 0 else index if index in TOOLS else -1
-        offset = self.lengths.get(number, 0.0) / 25.4
-        return (number, 0.0, 0.0, offset) + (0.0,) * 9 + (0,)
-
-    def change_tool(self, index):
-        self.spindle = index
-        self.tools_changed.append(index)
-
-    def check_abort(self):
-        return False
-
-    def user_defined_function(self, *arguments):
-        pass
-
-    def _motion(self, *arguments):
-        self.motions += 1
-        self.last_motion_line = self.line
-
-    straight_traverse = rigid_tap = _motion
-
-    def _feed_motion(self, *arguments):
-        # The module, unlike rs274, lets a feed motion without a feed pass.
-        if self.feed <= 0.0 and not self.feedless_line:
-            self.feedless_line = self.line
-        self._motion(*arguments)
-
-    straight_feed = arc_feed = straight_probe = _feed_motion
-
-    def set_feed_rate(self, feed):
-        self.feed = feed
-
-    def __getattr__(self, name):
-        if name.startswith("_") or name.startswith("get_"):
-            raise AttributeError(name)
-        return lambda *arguments: None  # state changes and messages
-
-
-def load_tool_table(path):
-    """Gives the interpreter library the tool data that a running LinuxCNC would share with it.
-
-    Without it the first T word reads memory that is not there. The table is a file in $HOME.
-    """
-    library = ctypes.CDLL("libtooldata.so.0", mode=ctypes.RTLD_GLOBAL)
-    create = library["_Z17tool_mmap_creatorPK13EMC_TOOL_STATi"]
-    create.argtypes = [ctypes.c_void_p, ctypes.c_int]
-    initialise = library["_Z13tooldata_initb"]
-    initialise.argtypes = [ctypes.c_bool]
-    load = library["_Z13tooldata_loadPKcPPc"]
-    load.argtypes = [ctypes.c_char_p, ctypes.c_void_p]
-    create(None, 0)
-    initialise(False)
-    if load(os.fsencode(path), None) != 0:
-        raise OSError(f"{path}: LinuxCNC does not load this tool table")
-
-
-def run_module(path, directory, mask, lengths):
-    """One program through the `gcode` module, in this process. Prints a summary, returns the
-    status."""
-    os.environ["HOME"] = directory
-    load_tool_table(os.path.join(directory, "tool.tbl"))
-    import gcode  # only with linuxcnc-uspace
-    canon = Canon(os.path.join(directory, "check.var"), mask, lengths)
-    result, line = gcode.parse(path, canon, "G21", "")
-    print(f"{canon.motions} {canon.last_motion_line} {','.join(map(str, canon.tools_changed)) or '-'}")
-    if result > gcode.MIN_ERROR:
-        print(f"near line {line}: {gcode.strerror(result)}")
-        return 1
-    if canon.feedless_line:
-        print(f"line {canon.feedless_line}: feed motion with zero feed rate")
-        return 1
-    # 1 is INTERP_EXIT (M2 or M30), 3 the end of the file at its second %.
-    if result not in (1, 3):
-        print(f"near line {line}: stopped without a program end (result {result})")
-        return 1
-    return 0
-
-
 class Checker:
     """Settings of one run over many files."""
 
@@ -197,14 +83,12 @@ class Checker:
         """Through the Python module, in a process of its own: (motions, last line, errors)."""
         with tempfile.TemporaryDirectory() as directory:
             self.files_in(directory)
-            tools = ",".join(f"{n}={length}" for n, length in self.lengths.items())
-            run = subprocess.run([sys.executable, os.path.abspath(__file__), "--one", path, directory,
-                                  str(self.mask), tools], capture_output=True, text=True,
-                                 errors="replace", check=False)
+            run = subprocess.run([sys.executable, "-B", WORKER, path, directory, str(self.mask)],
+                                 capture_output=True, text=True, errors="replace", check=False)
         lines = run.stdout.splitlines()
         if run.returncode not in (0, 1) or not lines:
             return 0, 0, [f"gcode module: status {run.returncode}: {run.stderr.strip()[-300:]}"]
-        motions, last, _ = lines[0].split()
+        motions, last = lines[0].split()
         return int(motions), int(last), [f"gcode module: {text}" for text in lines[1:]]
 
     def rs274(self, path):
@@ -247,10 +131,6 @@ def reason_to_skip():
 
 
 def main():
-    if sys.argv[1:2] == ["--one"]:
-        path, directory, mask, tools = sys.argv[2:6]
-        lengths = {int(n): v for n, v in parse_assignments(tools).items()}
-        sys.exit(run_module(path, directory, int(mask), lengths))
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("files", nargs="+")
     parser.add_argument("--machine")

@@ -94,8 +94,7 @@ class Machine:
                 direction @ self.workpiece_rotation)
 
     def poses(self, joints, tool_length, axis_weight):
-        """Points (tip, axis_weight * axis) in R^6: distances there mix mm with axis_weight mm per
-        rad."""
+        """Points (tip, axis_weight * axis) in R^6, whose distances count a rad axis_weight mm."""
         tip, axis = self.forward(joints, tool_length)
         return np.hstack([tip, axis_weight * axis])
 

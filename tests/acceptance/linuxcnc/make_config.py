@@ -135,8 +135,7 @@ def hal_text(machine, kins):
 
 
 def parameter_text(g54, g92):
-    """Persistent parameters: every offset 0 but those given. #5210 says that a G92 shift is
-    alive."""
+    """Persistent parameters: every offset 0 but those given; #5210 tells of a live G92."""
     values = {number: 0.0 for number in [*range(5161, 5170), *range(5181, 5190), 5210,
                                          *range(5211, 5220)]}
     values[5220] = 1.0

@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""Runs one NC program to its end in a headless LinuxCNC and logs the joints every servo cycle (1
-ms).
+"""Runs one NC program in a headless LinuxCNC and logs the joints every servo cycle (1 ms).
 
     run_program.py CONFIGDIR PROGRAM LOG [--timeout S] [--isolation auto|namespaces|none]
 

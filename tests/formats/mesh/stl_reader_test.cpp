@@ -179,7 +179,7 @@ TEST_CASE("stl_reader: truncated and lying binary headers are refused with the n
   const auto few = refusal(with_count(3));
   CHECK(few.code == "STL103");
   CHECK(contains(few.text, "room for 1 more"));
-  CHECK(refusal(with_count(0)).code == "STL109");
+  CHECK(refusal(with_count(0)).code == "STL103");
   CHECK(refusal("").code == "STL101");
   CHECK(refusal("PK\x03\x04").code == "STL105");
   CHECK(refusal(binary({})).code == "STL109");

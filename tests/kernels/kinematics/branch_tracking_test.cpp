@@ -416,10 +416,22 @@ TEST_CASE("branch_tracking: without a link the first rotary goes linearly throug
   points.push_back(point(Vec3(30, 60, 3), axis_at(0.2, 1.5), true, 11));
   const BranchTracking result = track_branches(*pair, points, settings);
   check_choice(*pair, points, settings, result);
-  const double step = (result.q.back()[first] - result.q.front()[first]) / 10.0;
-  CHECK(std::abs(std::abs(step) - 0.1) < 1e-12);
-  for (std::size_t i = 1; i < points.size(); ++i)
-    CHECK(std::abs(result.q[i][first] - result.q[i - 1][first] - step) < 1e-12);
+  // Nine points at the pole have eight motions between them.
+  const double step = (result.q.back()[first] - result.q.front()[first]) / 8.0;
+  CHECK(std::abs(std::abs(step) - 0.125) < 1e-12);
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const double expected = i == 1 || i == 10 ? 0.0 : step;
+    CHECK(std::abs(result.q[i][first] - result.q[i - 1][first] - expected) < 1e-12);
+  }
+
+  // One point at the pole has none: the motions into and out of it turn.
+  std::vector<TrackingPoint> touch{point(Vec3(60, 0, 0), axis_at(0.2, 0.5), false, 1)};
+  add_upright(touch, 1, {});
+  touch.push_back(point(Vec3(30, 60, 3), axis_at(0.2, 1.5), true, 3));
+  const BranchTracking touched = track_branches(*pair, touch, settings);
+  check_choice(*pair, touch, settings, touched);
+  CHECK(std::abs(std::abs(touched.q[1][first] - touched.q[0][first]) - 0.5) < 1e-12);
+  CHECK(std::abs(std::abs(touched.q[2][first] - touched.q[1][first]) - 0.5) < 1e-12);
 
   // A single point is too short for a large turn when the second branch is out of reach.
   ScrewChain one_sided = chain;
