@@ -82,14 +82,15 @@ class MillWriter {
     for (int pass = 0; pass <= 8; ++pass) {
       const double y = -32.0 + 8.0 * pass;
       const double side = pass % 2 ? -1.0 : 1.0;
-      feed({-50.0 * side, y, kTopFace}, 600.0);
+      if (pass > 0) feed({-50.0 * side, y, kTopFace}, 600.0);
       feed({50.0 * side, y, kTopFace}, 900.0);
     }
     feed({50, 32, kTopFace + 2.0}, 900.0);
     rapid({50, 32, kSafe}, {0.0, 0.0});
   }
 
-  /// A ring of three half circles and one helix down, at A0 C0.
+  /// A ring: half a turn of helix down, half a turn by its centre, two quarters back by their
+  /// radius.
   void groove() {
     text_.comment("RING GROOVE R25, ARCS AT A0");
     rapid({25, 0, kSafe}, {0.0, 0.0});

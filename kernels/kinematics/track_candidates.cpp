@@ -188,13 +188,13 @@ class CandidateBuilder {
 
   void add_held(std::size_t i, const RunEnd& before) {
     for (std::uint8_t b = 0; b < 2; ++b)
-      if (before.valid[b]) add_pole(i, {before.first[b], 0.0, b, b, false, false});
+      if (before.valid[b]) add_pole(i, {before.first[b], 0.0, b, b, false, false, false});
   }
 
   void add_ahead(std::size_t i, const RunEnd& after, bool link) {
     for (std::uint8_t b = 0; b < 2; ++b) {
       const auto track = static_cast<std::uint8_t>(kAhead + b);
-      if (after.valid[b]) add_pole(i, {after.first[b], 0.0, b, track, false, link});
+      if (after.valid[b]) add_pole(i, {after.first[b], 0.0, b, track, false, link, false});
     }
   }
 

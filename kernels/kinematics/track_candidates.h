@@ -18,6 +18,7 @@ struct TrackCandidate {
   std::uint8_t track = 0;  ///< in a pole run: candidates of one track continue each other
   bool valid = false;      ///< reachable, free linears within their limits
   bool ahead = false;      ///< in a pole run: the first rotary already has the value behind the run
+  bool through = false;    ///< in a pole run: the first rotary turns along the run
 };
 
 /// The candidates of one point.

@@ -16,6 +16,9 @@ constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr double kStartWeight = 0.01;
 // Cost (rad) of having turned the first rotary one point too early in a pole run.
 constexpr double kEarly = 1e-9;
+// Cost (rad) of turning the first rotary on a cut into or out of a pole run that could turn
+// elsewhere.
+constexpr double kTurnAtRim = 0.01;
 constexpr std::uint32_t kNoTable = std::numeric_limits<std::uint32_t>::max();
 
 /// Whole turns of both rotaries, as an inclusive window.
@@ -173,6 +176,8 @@ class TurnSearch {
     CutStep step;
     if (!b.valid) return step;
     if (layer(i - 1).pole && layer(i).pole && a.track != b.track) return step;
+    const bool rim = layer(i - 1).pole != layer(i).pole;
+    const bool through = (layer(i).pole ? b : a).through;
     step.cost = standing_cost(i, k);
     for (int r = 0; r < 2; ++r) {
       const double change = angle(b, r) - angle(a, r);
@@ -181,6 +186,7 @@ class TurnSearch {
       if (distance > settings_.step * (1.0 + 1e-12) + 1e-12) return step;
       step.shift[r] = -static_cast<int>(turns);
       step.cost += distance;
+      if (r == 0 && rim && !through && distance > 1e-9) step.cost += kTurnAtRim;
     }
     step.allowed = true;
     return step;

@@ -247,13 +247,14 @@ TEST_CASE("branch_tracking: a spiral winds as far as the range lets it", "[kerne
   std::vector<TrackingPoint> linked = three;
   linked[100].cut = false;
   check_choice(*pair, linked, settings, track_branches(*pair, linked, settings));
-  chain.joints[3].lower = -3.0 * kPi;
+  chain.joints[3].lower = -2.9 * kPi;
   chain.joints[3].upper = 3.0 * kPi;
-  const auto larger = RotaryPair::from(chain);
-  CHECK(track_branches(*larger, three, settings).status == Status::rewind_needed);
-  chain.joints[3].lower = -4.0 * kPi;
-  const auto largest = RotaryPair::from(chain);
-  check_choice(*largest, three, settings, track_branches(*largest, three, settings));
+  CHECK(track_branches(*RotaryPair::from(chain), three, settings).status == Status::rewind_needed);
+  // Three turns fit between ±540 degrees on the branch with B < 0, which is half a turn off.
+  chain.joints[3].lower = -3.0 * kPi;
+  const BranchTracking other = track_branches(*RotaryPair::from(chain), three, settings);
+  check_choice(*RotaryPair::from(chain), three, settings, other);
+  CHECK(other.branch.front() == 1);
 }
 
 TEST_CASE("branch_tracking: the first point is near held when nothing else decides",
@@ -444,6 +445,7 @@ TEST_CASE("branch_tracking: without a link the first rotary goes linearly throug
   REQUIRE(refused.status == Status::rewind_needed);
   CHECK(refused.rewinds[0].line == 3);
   CHECK(refused.rewinds[0].joint == narrow->first_rotary());
+  CAPTURE(refused.reason);
   CHECK(refused.reason.find("166.157 degrees") != std::string::npos);
   corner.back().cut = false;
   check_choice(*narrow, corner, settings, track_branches(*narrow, corner, settings));
