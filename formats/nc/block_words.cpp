@@ -103,7 +103,10 @@ void BlockReader::add_g(const Piece& piece, std::uint32_t index) {
     return;
   }
   const auto group = static_cast<std::size_t>(info.group);
-  if (block_.g[group] != kNoCode) {
+  // G80 beside another motion code has no effect.
+  constexpr GCode kG80 = 800;
+  if (code == kG80 && block_.g[group] != kNoCode) return;
+  if (block_.g[group] != kNoCode && block_.g[group] != kG80) {
     refuse("NC204",
            g_code_text(block_.g[group]) + " and " + g_code_text(code) +
                " are of one modal group; write them on two lines",

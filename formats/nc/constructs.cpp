@@ -58,6 +58,10 @@ bool is_tcp_name(std::string_view name) {
 ConstructSpan measure_name(std::string_view rest) {
   std::size_t end = 0;
   while (end < rest.size() && is_name_character(rest[end])) ++end;
+  // A function, as in SIN[30] or XSIN[30].
+  if (end < rest.size() && rest[end] == '[') {
+    return {Construct::expression, to_length(behind_bracket(rest, end))};
+  }
   const Construct kind = is_tcp_name(rest.substr(0, end)) ? Construct::tcp_mode : Construct::name;
   return {kind, length_to_comment(rest)};
 }
@@ -73,7 +77,14 @@ ConstructSpan measure_letter(std::string_view rest) {
   if (rest[i] == '#') return {Construct::parameter, to_length(behind_parameter(rest, i))};
   if (rest[i] == '=') return {Construct::assignment, length_to_comment(rest)};
   const std::size_t end = behind_number(rest, i);
-  if (end == i) return {Construct::letter_alone, 1};
+  if (end == i) {
+    std::size_t name = i;
+    while (name < rest.size() && is_letter(rest[name])) ++name;
+    if (name > i && name < rest.size() && rest[name] == '[') {
+      return {Construct::expression, to_length(behind_bracket(rest, name))};
+    }
+    return {Construct::letter_alone, 1};
+  }
   if (end < rest.size() && rest[end] == '=') {
     return {Construct::assignment, length_to_comment(rest)};
   }

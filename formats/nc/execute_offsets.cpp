@@ -116,14 +116,25 @@ void Executor::go_home(const BlockWords& block, const BlockPlan& plan, HomePosit
   const AxisMask moved = plan.axes != 0 ? plan.axes : settings_.axes;
   begin_motion(block, plan);
   motion_.machine_position = true;
-  motion_.end = motion_.start;
-  motion_.unknown_end = coordinates_.unknown();
-  for (std::size_t i = 0; i < motion_.end.size(); ++i) {
-    if ((moved & bit(i)) == 0) continue;
-    motion_.end[i] = home.machine[i] - coordinates_.tool()[i];
-    const auto set = static_cast<AxisMask>(motion_.unknown_end | bit(i));
-    motion_.unknown_end = (home.known & bit(i)) != 0 ? static_cast<AxisMask>(set ^ bit(i)) : set;
+  // With an XY rotation the controller takes the programmed words' coordinates of the home
+  // position.
+  AxisWords home_world;
+  for (std::size_t i = 0; i < home_world.size(); ++i) {
+    home_world[i] = home.machine[i] - coordinates_.tool()[i];
   }
+  const AxisWords home_program = coordinates_.program_from_world(home_world);
+  AxisWords program = coordinates_.program_from_world(motion_.start);
+  motion_.end = motion_.start;
+  motion_.unknown_end = coordinates_.unknown_after(moved & home.known);
+  for (std::size_t i = 0; i < program.size(); ++i) {
+    if ((moved & bit(i)) == 0) continue;
+    program[i] = home_program[i];
+    motion_.end[i] = home_world[i];
+    if ((home.known & bit(i)) == 0) {
+      motion_.unknown_end = static_cast<AxisMask>(motion_.unknown_end | bit(i));
+    }
+  }
+  if (coordinates_.rotated()) motion_.end = coordinates_.world_from_program(program);
   finish_motion();
 }
 

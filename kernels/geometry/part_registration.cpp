@@ -565,8 +565,25 @@ std::string to_string(RegistrationVerdict verdict) {
 }
 
 std::string registration_code(RegistrationVerdict verdict) {
-  if (verdict == RegistrationVerdict::registered) return "";
-  return "RG11" + std::to_string(static_cast<int>(verdict));
+  switch (verdict) {
+    case RegistrationVerdict::registered:
+      return "";
+    case RegistrationVerdict::outliers:
+      return "RG111";
+    case RegistrationVerdict::unit_ratio:
+      return "RG112";
+    case RegistrationVerdict::offset:
+      return "RG113";
+    case RegistrationVerdict::mirrored:
+      return "RG114";
+    case RegistrationVerdict::reversed_triangles:
+      return "RG115";
+    case RegistrationVerdict::tilted_axes:
+      return "RG116";
+    case RegistrationVerdict::wrong_part:
+      break;
+  }
+  return "RG117";
 }
 
 }  // namespace smoothpost

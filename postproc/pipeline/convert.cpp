@@ -73,32 +73,24 @@ class PartCheck {
   const Diagnostics& diagnostics() const { return tree_.diagnostics(); }
   bool ok() const { return tree_.ok(); }
 
-  Check input(const ToolPath& path) const {
+  PartRegistration input(const ToolPath& path) const {
     std::vector<CutterLocation> points;
     for (std::size_t i = 1; i < path.points.size(); ++i)
       if (path.points[i].beam) points.push_back(path.points[i].location);
-    return registration_check(register_part(points, tree_.value(), settings_), settings_);
+    return register_part(points, tree_.value(), settings_);
   }
 
+  const RegistrationSettings& settings() const { return settings_; }
+
   Check output(const ReadBack& read, const ScrewChain& chain) const {
-    const auto locations = beam_locations(read, chain);
+    const GapStatistics gap = measure_gaps(beam_locations(read, chain), tree_.value(), settings_);
     Check c;
     c.name = "gap";
     c.unit = "mm";
+    c.value = gap.worst_deviation;
     c.limit = settings_.allowed_gap_deviation;
-    std::uint32_t hint = 0;
-    std::size_t worst = 0;
-    for (std::size_t i = 0; i < locations.size(); ++i) {
-      const ClosestPoint closest = tree_.value().closest(locations[i].tip, hint);
-      hint = closest.triangle;
-      const double deviation = std::abs(closest.signed_distance - settings_.nominal_gap);
-      if (deviation > c.value || i == 0) {
-        c.value = deviation;
-        worst = i;
-      }
-    }
     c.ok = c.value <= c.limit;
-    c.output_line = line_of(read, worst);
+    c.output_line = line_of(read, gap.worst);
     return c;
   }
 
@@ -230,8 +222,11 @@ class Converter {
     part_.emplace(*in_.part, in_.machine);
     append(out_.diagnostics, part_->diagnostics());
     if (!part_->ok()) return false;
-    const Check c = part_->input(in_.input.path);
-    if (!c.ok) out_.diagnostics.push_back(diagnostic("RG201", c.note, in_.part_name));
+    const PartRegistration registration = part_->input(in_.input.path);
+    const Check c = registration_check(registration, part_->settings());
+    if (!c.ok)
+      out_.diagnostics.push_back(
+          diagnostic(registration_code(registration.verdict).c_str(), c.note, in_.part_name));
     out_.checks.push_back(c);
     watch_.lap("registration");
     return c.ok || force_;
@@ -253,6 +248,7 @@ class Converter {
     settings.axis_tolerance = tolerance.axis * tolerance.budget.chord;
     settings.held = home_of(in_.machine);
     settings.file_name = in_.input_name;
+    for (const auto& axis : in_.machine.axes) settings.axis_names.push_back(axis.name);
     const auto samples = plan_joints(reference_, *pair, settings, progress_);
     append(out_.diagnostics, samples.diagnostics());
     watch_.lap("kinematics");
@@ -321,6 +317,7 @@ class Converter {
     for (const Check& c : out_.checks) {
       if (c.ok) continue;
       if (c.name.rfind("beam_", 0) == 0) beam_rules_ok = false;
+      if (c.name == "part_registration") continue;  // told by its own name already
       out_.diagnostics.push_back(diagnostic(
           "CK101", describe(c), in_.input_name, static_cast<int>(c.input_line)));
     }

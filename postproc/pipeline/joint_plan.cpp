@@ -210,25 +210,35 @@ class Planner {
     return d;
   }
 
+  // Kernels count joints from 1; people know axes by name.
+  std::string named(std::string text) const {
+    for (std::size_t j = settings_.axis_names.size(); j-- > 0;) {
+      const std::string joint = "joint " + std::to_string(j + 1);
+      for (std::size_t at = 0; (at = text.find(joint, at)) != std::string::npos;)
+        text.replace(at, joint.size(), "axis " + settings_.axis_names[j]);
+    }
+    return text;
+  }
+
   Result<std::vector<JointSample>> fail(const BranchTracking& tracking) const {
     Diagnostics out;
     const std::uint32_t line = reference_.path().points[tracked_[tracking.point].segment].line;
     switch (tracking.status) {
       case BranchTracking::Status::unreachable:
-        out.push_back(at_line("KN101", line, "the tool axis cannot be reached by this machine: " + tracking.reason));
+        out.push_back(at_line("KN101", line, "the tool axis cannot be reached by this machine: " + named(tracking.reason)));
         break;
       case BranchTracking::Status::over_limit:
         out.push_back(at_line("KN102", line,
-                              "no position of the machine within its limits: " + tracking.reason +
+                              "no position of the machine within its limits: " + named(tracking.reason) +
                                   ". Place the part elsewhere with --work-offset or choose another machine"));
         break;
       default:
         for (const auto& rewind : tracking.rewinds)
           out.push_back(at_line("KN103", rewind.line,
-                                "the cut cannot go on without a rewind here: " + rewind.reason +
+                                "the cut cannot go on without a rewind here: " + named(rewind.reason) +
                                     ". Split the cut before this line or choose a machine with more range"));
         if (out.empty())
-          out.push_back(at_line("KN103", line, "a rewind is needed: " + tracking.reason));
+          out.push_back(at_line("KN103", line, "a rewind is needed: " + named(tracking.reason)));
         break;
     }
     return Result<std::vector<JointSample>>::failure(std::move(out));

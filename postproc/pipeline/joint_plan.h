@@ -16,6 +16,7 @@ struct JointPlanSettings {
   double axis_tolerance = 0.0;  ///< rad, likewise
   JointVector held;             ///< redundant joints' values; also where the joints start from
   std::string file_name;        ///< for messages
+  std::vector<std::string> axis_names;  ///< for messages, in joint order
 };
 
 /// Joint values on the way: at share `s` of `segment` (segment 0: the first path point).

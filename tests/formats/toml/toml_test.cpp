@@ -130,7 +130,15 @@ TEST_CASE("toml: broken text is an error at its place", "[formats][toml]") {
                         {"a = 1\n[a]\n", 2},
                         {"a = \"\\q\"\n", 1},
                         {"= 1\n", 1},
-                        {"a = 1 b = 2\n", 1}};
+                        {"a = 1 b = 2\n", 1},
+                        {"[[[a]]]\n", 1},
+                        {"a = 1\n[[=\n", 2},
+                        {"[[", 1},
+                        {"[", 1},
+                        {"a = 1\n[[ ]]\n", 2},
+                        {"a.", 1},
+                        {"a = {", 1},
+                        {"a = { b.", 1}};
   for (const Case& c : cases) {
     INFO(c.text);
     const Diagnostic diagnostic = failure(c.text);
