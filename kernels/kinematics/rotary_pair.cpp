@@ -90,6 +90,32 @@ struct RotaryPair::Reach {
 
 namespace {
 
+/// Directions of the linears in F, by group; false when free ones of one group are dependent.
+template <typename Geometry>
+bool place_linears(const Flattened& flat, const std::array<Mat3, 3>& to_frame, Geometry& g) {
+  std::size_t group = 0;
+  std::size_t count = 0;
+  for (const Flattened::Joint& joint : flat.joints) {
+    if (joint.kind == JointKind::rotary) {
+      ++group;
+      continue;
+    }
+    const Vec3 direction = to_frame[group] * joint.direction;
+    if (joint.held)
+      g.held.push_back({joint.joint, static_cast<int>(group), direction});
+    else
+      g.free[count++] = {joint.joint, static_cast<int>(group), direction};
+  }
+  const bool one_group = g.free[0].group == g.free[2].group;
+  g.group = one_group ? g.free[0].group : -1;
+  if (!one_group) return true;
+  Mat3 directions;
+  for (int i = 0; i < 3; ++i) directions.col(i) = g.free[i].direction;
+  if (std::abs(directions.determinant()) < kIndependent) return false;
+  g.inverse = directions.inverse();
+  return true;
+}
+
 /// v turned about e2 = (sine, 0, cosine) of the geometry; `direction` −1 turns it back.
 template <typename Geometry, typename Rotation>
 Vec3 turned_about_second(const Geometry& g, const Rotation& r, double direction, const Vec3& v) {
@@ -178,30 +204,10 @@ std::optional<RotaryPair::Geometry> RotaryPair::geometry_of(const ScrewChain& ch
   g.second_origin = to_frame * (rotary[1]->origin - origin);
 
   // Behind the second rotary everything is taken as it lies at β0.
-  const Mat3 behind = to_frame * (g.offset == 0.0 ? Mat3(Mat3::Identity())
-                                                  : rotation_about(e2.normalized(), g.offset));
+  Mat3 behind = to_frame;
+  if (g.offset != 0.0) behind = to_frame * rotation_about(e2.normalized(), g.offset);
   g.tip = behind * (flat.tip - rotary[1]->origin);
-  int group = 0;
-  std::size_t count = 0;
-  for (const Flattened::Joint& joint : flat.joints) {
-    if (joint.kind == JointKind::rotary) {
-      ++group;
-      continue;
-    }
-    const Linear linear{joint.joint, group, (group == 2 ? behind : to_frame) * joint.direction};
-    if (joint.held)
-      g.held.push_back(linear);
-    else
-      g.free[count++] = linear;
-  }
-  const bool one_group = g.free[0].group == g.free[2].group;
-  g.group = one_group ? g.free[0].group : -1;
-  if (one_group) {
-    Mat3 directions;
-    for (int i = 0; i < 3; ++i) directions.col(i) = g.free[i].direction;
-    if (std::abs(directions.determinant()) < kIndependent) return std::nullopt;
-    g.inverse = directions.inverse();
-  }
+  if (!place_linears(flat, {to_frame, to_frame, behind}, g)) return std::nullopt;
   return g;
 }
 

@@ -139,6 +139,13 @@ class Run {
       }
       input_bytes_ = std::move(bytes.value());
     }
+    if (!options_.output.empty() && options_.output != "-" && !options_.input_data) {
+      std::error_code error;
+      if (fs::equivalent(options_.output, options_.input, error)) {
+        add(usage_error("US105", "-o " + options_.output + " is the input file: name another output"));
+        return false;
+      }
+    }
     context_.input_file = base_name(input_name_);
     context_.input_sha256 = sha256(input_bytes_);
     context_.version = kVersion;

@@ -18,6 +18,7 @@ class Builder {
           const std::vector<JointSample>& samples)
       : input_(input), machine_(machine), chain_(chain), samples_(samples) {
     retract_ = machine.axis_by_name(machine.links.retract_axis);
+    if (retract_ >= 0) retract_position_ = retract_beyond_path();
     for (int j = 0; j < machine.size(); ++j) {
       const bool rotary = machine.axes[static_cast<std::size_t>(j)].joint.kind == JointKind::rotary;
       (rotary ? rotary_ : linear_) |= 1U << j;
@@ -51,8 +52,19 @@ class Builder {
  private:
   JointMask retract_bit() const { return retract_ < 0 ? 0U : 1U << retract_; }
 
+  // The retract position of the machine file, or further out where the path itself goes further out: a
+  // link never runs below the highest place of the path.
+  double retract_beyond_path() const {
+    const auto& joint = machine_.axes[static_cast<std::size_t>(retract_)].joint;
+    const bool upwards = machine_.links.retract >= 0.5 * (joint.lower + joint.upper);
+    double position = machine_.links.retract;
+    for (const auto& sample : samples_)
+      position = upwards ? std::max(position, sample.q[retract_]) : std::min(position, sample.q[retract_]);
+    return position;
+  }
+
   JointVector with_retract(JointVector q) const {
-    if (retract_ >= 0) q[retract_] = machine_.links.retract;
+    if (retract_ >= 0) q[retract_] = retract_position_;
     return q;
   }
 
@@ -156,6 +168,7 @@ class Builder {
   const ScrewChain& chain_;
   const std::vector<JointSample>& samples_;
   int retract_ = -1;
+  double retract_position_ = 0.0;
   JointMask rotary_ = 0;
   JointMask linear_ = 0;
   std::size_t next_event_ = 0;

@@ -292,6 +292,72 @@ TEST_CASE("interpret: G49 after G43, G53 and an unknown start", "[postproc][pipe
   CHECK(has_code(second.diagnostics(), "PR301"));
 }
 
+TEST_CASE("convert: positions of the input machine in mid program become links of ours",
+          "[postproc][pipeline]") {
+  // G53 and G28 go to places of the A/C machine that mean nothing on the B/C machine.
+  for (const char* away : {"G53 G0 Z50", "G28 Z60"}) {
+    const auto in = prepare(std::string("%\nM428\nG21 G90 G94\nG0 X0 Y0 Z20 A0 C0\nG1 X10 F500\n") + away +
+                                "\nG0 X5 Y5 Z20 A-30 C10\nG1 X15 F500\nG0 Z60\nM30\n%\n",
+                            "table_table_ac", "table_table_bc");
+    const Conversion c = convert(in, false, {});
+    INFO(away);
+    for (const auto& d : c.diagnostics) UNSCOPED_INFO(to_string(d));
+    REQUIRE(c.verdict == Verdict::certified);
+    // Between the two cuts the retract axis goes to the retract position, alone.
+    const int z = in.machine.axis_by_name(in.machine.links.retract_axis);
+    bool retracted = false, cut_before = false;
+    for (std::size_t i = 1; i < c.line_map.size(); ++i) {
+      if (c.line_map[i].role == MoveRole::path) cut_before = true;
+      const auto step = (c.read.moves[i].to - c.read.moves[i - 1].to).eval();
+      if (cut_before && !retracted && c.line_map[i].role == MoveRole::link &&
+          std::abs(c.read.moves[i].to[z] - in.machine.links.retract) < 1e-9 && step[z] != 0.0) {
+        retracted = true;
+        for (int j = 0; j < 5; ++j)
+          if (j != z) CHECK(step[j] == 0.0);
+      }
+    }
+    CHECK(retracted);
+  }
+}
+
+TEST_CASE("convert: tools of different length", "[postproc][pipeline]") {
+  auto settings = posted_for("table_table_ac");
+  settings.tool_lengths = {{1, 60.0}, {2, 85.5}};
+  auto read = interpret_nc("%\nM428\nG21 G90 G94\nT1 M6\nG43 H1\nG0 X0 Y0 Z20 A0 C0\nG1 X10 F500\nG0 Z40\n"
+                           "T2 M6\nG43 H2\nG0 X0 Y0 Z20\nG1 X10 A-30 F500\nG0 Z60\nM30\n%\n",
+                           settings);
+  for (const auto& d : read.diagnostics()) UNSCOPED_INFO(to_string(d));
+  REQUIRE(read.ok());
+  ConvertInput in;
+  in.input = std::move(read.value());
+  in.machine = shipped_machine("table_table_bc");
+  in.input_name = "part.ngc";
+  const Conversion c = convert(in, false, {});
+  for (const auto& d : c.diagnostics) UNSCOPED_INFO(to_string(d));
+  REQUIRE(c.verdict == Verdict::certified);
+  // At B = 0 the Z axis stands one tool length above the tip: lines 7 and 12 are at tip height 20.
+  for (std::size_t i = 0; i < c.line_map.size(); ++i) {
+    if (c.line_map[i].input_line == 7) CHECK(c.read.moves[i].to[2] == Approx(80.0).margin(1e-4));
+    if (c.line_map[i].input_line == 11 && c.line_map[i].to_share == 1.0)
+      CHECK(c.read.moves[i].to[2] == Approx(105.5).margin(1e-4));
+  }
+}
+
+TEST_CASE("convert: the same input gives the same bytes", "[postproc][pipeline]") {
+  const auto in = prepare(kMill, "table_table_ac", "table_table_bc");
+  CHECK(convert(in, false, {}).program == convert(in, false, {}).program);
+}
+
+TEST_CASE("convert: cancelling never leaves a certificate", "[postproc][pipeline]") {
+  const auto in = prepare(kMill, "table_table_ac", "table_table_bc");
+  for (int at = 1; at <= 2; ++at) {
+    int calls = 0;
+    Progress progress;
+    progress.report = [&](const char*, double) { return ++calls < at; };
+    CHECK(convert(in, false, progress).verdict == Verdict::refused);
+  }
+}
+
 TEST_CASE("convert: out of the machine's range is named with line and limit", "[postproc][pipeline]") {
   auto in = prepare(kLaserHead + "G1 X10 F1000\n" + kLaserEnd, "laser_5p1", "laser_5p1");
   in.placement = at(-100, 600, 1000);
