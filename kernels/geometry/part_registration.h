@@ -24,7 +24,7 @@ enum class RegistrationVerdict : std::uint8_t {
   unit_ratio,          ///< program or part is 25.4 times too large or too small
   offset,              ///< a constant shift brings the gaps within
   mirrored,            ///< a mirror image (about X, Y or Z = 0, or shifted) fits
-  reversed_triangles,  ///< the points lie at the nominal gap on the inner side of the triangles
+  reversed_triangles,  ///< a closed part turned inside out
   tilted_axes,         ///< the gaps fit, the tool axes do not follow the surface
   wrong_part           ///< none of these explains the gaps
 };
@@ -53,14 +53,13 @@ enum class UnitSuspect : std::uint8_t { none, program, part, either };
 struct PartRegistration {
   RegistrationVerdict verdict = RegistrationVerdict::wrong_part;
   GapStatistics gap;  ///< of the program as given: the check on every point
-  /// Of the explanation that fits (verdict unit_ratio, offset, mirrored): the same statistics after
-  /// it.
+  /// The same statistics after the explanation that fits (unit_ratio, offset, mirrored, reversed).
   GapStatistics explained;
   double program_ratio = 1.0;  ///< the program's points must be multiplied by this to fit the part
   UnitSuspect suspect = UnitSuspect::none;
   int mirror_axis = -1;  ///< 0, 1, 2: X, Y, Z change sign before `offset` is added
-  Vec3 offset =
-      Vec3::Zero();  ///< mm, to be added to the program's points so that they lie on the part
+  /// mm, to be added to the program's points so that they lie on the part.
+  Vec3 offset = Vec3::Zero();
   /// Unit directions in which a shift changes no gap (a flat sheet has two, an extruded one one):
   /// `offset` has no component there, and an error of the work offset along them cannot be seen.
   std::vector<Vec3> unseen;
@@ -83,11 +82,9 @@ struct PartRegistration {
 /// Directions that no normal sees are left at the start's value and listed in `unseen`.
 ///
 /// Guarantees: deterministic; at most 2000 sampled points per hypothesis, every point for the
-/// statistics
-///   and for the explanation that is named.
+///   statistics and for the explanation that is named.
 /// What cannot be seen: a shift within a flat sheet's plane or along an extruded sheet, a mirror
-/// image of a
-///   part that is its own, two parts that agree where the program cuts.
+///   image of a part that is its own, two parts that agree where the program cuts.
 /// Units: mm, rad, the frame of mesh and points the same.
 /// Cost: one closest-point query a point when registered; a refusal up to about 700,000 more.
 /// @pre points not empty, axes of unit length, settings finite and not negative
@@ -95,8 +92,7 @@ struct PartRegistration {
 PartRegistration register_part(const std::vector<CutterLocation>& points, const TriangleTree& tree,
                                const RegistrationSettings& settings);
 
-/// The distances and angles of all points, as register_part() judges them, without looking for
-/// explanations.
+/// Distances and angles of all points as register_part() judges them, without explanations.
 /// @pre as register_part()   @throws ContractViolation if not.
 GapStatistics measure_gaps(const std::vector<CutterLocation>& points, const TriangleTree& tree,
                            const RegistrationSettings& settings);

@@ -195,6 +195,9 @@ struct TriangleTree::Impl {
 void TriangleTree::Impl::take_facets(const TriangleMesh& mesh) {
   facet_of.assign(mesh.triangles.size(), kNone);
   facets.reserve(mesh.triangles.size());
+  normals.reserve(mesh.triangles.size());
+  triangle.reserve(mesh.triangles.size());
+  vertex.reserve(mesh.triangles.size());
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const auto& t = mesh.triangles[i];
     for (const auto v : t) {
@@ -213,6 +216,8 @@ void TriangleTree::Impl::take_facets(const TriangleMesh& mesh) {
 
 void TriangleTree::Impl::take_edges(const TriangleMesh& mesh) {
   edge.resize(facets.size());
+  edge_normals.reserve(facets.size() * 3 / 2 + 3);
+  edge_open.reserve(facets.size() * 3 / 2 + 3);
   vertex_open.assign(mesh.vertices.size(), 0);
   for_each_edge(mesh, [&](const MeshEdge* begin, const MeshEdge* end) {
     const auto index = static_cast<std::uint32_t>(edge_normals.size());

@@ -58,8 +58,7 @@ MeshReport describe(const TriangleMesh& mesh);
 /// True for a triangle without area as MeshReport::degenerate defines it.
 bool has_no_area(const TriangleMesh& mesh, std::size_t triangle);
 
-/// The findings of a report as warnings STL121..STL126 with counts and first triangles (counted
-/// from 1).
+/// The findings of a report as STL121..STL126: counts and first triangles (counted from 1).
 Diagnostics mesh_findings(const MeshReport& report, const std::string& file_name);
 
 }  // namespace smoothpost

@@ -5,6 +5,7 @@
     - every diagnostic code in the sources has one row in docs/diagnostics.md, and every row a source;
     - every kernel function that "Implements [Key]" something has a row in docs/equations.md, which names
       a declared function and the title of a test that exists; every key is in docs/references.bib;
+    - every check that the pipeline makes has a row in docs/guarantees.md, and every row a check;
     - every relative link of every .md file leads to a file, and to a heading where it has an anchor.
   docs_test.py --self-test  builds small trees with one fault each and sees each one reported
 """
@@ -145,6 +146,24 @@ def check_equations(root):
     return problems
 
 
+# --- checks ----------------------------------------------------------------------------------------
+
+CHECK_NAME = re.compile(r'(?:\.check\(|\brule\(|\.name = )"([a-z_]+\.?)"')
+CHECK_ROW = re.compile(r"^`([a-z_]+\.?)(?:<axis>)?`$")
+
+
+def check_checks(root):
+    page = root / "docs/guarantees.md"
+    made = {name for file in sources(root, floors=["postproc"], suffixes=(".cpp",)) for name in CHECK_NAME.findall(read(file))}
+    rows = set()
+    for _, cells in table_rows(read(page)) if page.exists() else ():
+        name = CHECK_ROW.match(cells[0])
+        if name and len(cells) == 4:
+            rows.add(name.group(1))
+    problems = [f"docs/guarantees.md: no row for the check {name}" for name in sorted(made - rows)]
+    return problems + [f"docs/guarantees.md: no source makes the check {name}" for name in sorted(rows - made)]
+
+
 # --- links -------------------------------------------------------------------------------------------
 
 LINK = re.compile(r"(?<!!)\[[^\]]*\]\(([^)\s]+)(?:\s+\"[^\"]*\")?\)|!\[[^\]]*\]\(([^)\s]+)\)")
@@ -190,7 +209,7 @@ def check_links(root):
 
 def check(root):
     root = Path(root).resolve()
-    return check_diagnostics(root) + check_equations(root) + check_links(root)
+    return check_diagnostics(root) + check_equations(root) + check_checks(root) + check_links(root)
 
 
 # --- self-test ---------------------------------------------------------------------------------------
@@ -203,6 +222,9 @@ GOOD_TREE = {
     "docs/diagnostics.md": "# Codes\n\n| Code | Meaning | What to do |\n|---|---|---|\n| NC101 | a | b |\n",
     "docs/equations.md": "| Equation | Function | Test | Difference |\n|---|---|---|---|\n"
                          "| [Cai2025] (6) | `basis` | `basis: mirror symmetry`, `... symmetry` | none |\n",
+    "postproc/pipeline/verify.cpp": 'auto a = rule("beam_off", 1); b = c.check("limit." + axis, 1); d.name = "gap";\n',
+    "docs/guarantees.md": "| Check | Value | Limit | Says |\n|---|---|---|---|\n| `beam_off` | moves | 0 | a |\n"
+                          "| `limit.<axis>` | mm | 1 | b |\n| `gap` | mm | 1 | c |\n",
     "docs/references.bib": "@article{Cai2025,\n}\n@book{Lynch2017,\n}\n",
     "README.md": "# House\n\n[codes](docs/diagnostics.md#codes) [web](https://example.org) `[not](alink.md)`\n",
 }
@@ -226,6 +248,9 @@ FAULTS = [
     ("row without a test", "docs/equations.md",
      GOOD_TREE["docs/equations.md"].replace("`basis: mirror symmetry`, `... symmetry`", "yes"), "names no test"),
     ("unknown paper", "docs/references.bib", "@article{Cai2025,\n}\n", "[Lynch2017] is not in"),
+    ("check without a row", "postproc/pipeline/convert.cpp", 'c.name = "other";\n', "no row for the check other"),
+    ("row without a check", "docs/guarantees.md", GOOD_TREE["docs/guarantees.md"] + "| `clearance` | mm | 1 | d |\n",
+     "no source makes the check clearance"),
     ("broken link", "README.md", "[codes](docs/codes.md)\n", "no such file: docs/codes.md"),
     ("broken link to a picture", "README.md", "![plot](plot.png)\n", "no such file: plot.png"),
     ("broken anchor", "README.md", "[codes](docs/diagnostics.md#other)\n", "no such heading"),

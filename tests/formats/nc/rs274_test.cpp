@@ -169,20 +169,6 @@ nc::InterpreterSettings oracle_settings() {
   return settings;
 }
 
-bool motion_is_arc(const OracleMotion& motion) { return motion.arc; }
-bool motion_is_arc(const CanonicalMotion& motion) { return motion.is_arc; }
-
-/// Motions that change nothing are left out on both sides: G28 without words makes one in LinuxCNC.
-template <class Motion, class Same>
-std::vector<Motion> without_standstill(const std::vector<Motion>& motions, Same same) {
-  std::vector<Motion> out;
-  for (const Motion& motion : motions) {
-    if (!out.empty() && !motion_is_arc(motion) && same(out.back(), motion)) continue;
-    out.push_back(motion);
-  }
-  return out;
-}
-
 std::array<double, 6> end_of(const CanonicalMotion& motion) {
   std::array<double, 6> end{};
   for (std::size_t i = 0; i < 6; ++i) end[i] = i < 3 ? motion.end[i] : degrees(motion.end[i]);
@@ -217,45 +203,51 @@ Comparison compare(const std::vector<CanonicalMotion>& ours, const OracleRun& or
   // shifted positions are sums of up to three such numbers.
   const double digit = (oracle.inch ? kMillimetresPerInch : 1.0) * 1e-4;
   const double tolerance = oracle.rotated || oracle.inch ? 3.0 * digit : 1.01 * digit;
-  auto mine = ours;
-  auto theirs = oracle.motions;
-  if (mine.size() != theirs.size()) {
-    mine = without_standstill(ours, [](const CanonicalMotion& a, const CanonicalMotion& b) {
-      return distance(end_of(a), end_of(b)) < 1e-4;
-    });
-    theirs = without_standstill(oracle.motions, [](const OracleMotion& a, const OracleMotion& b) {
-      return distance(a.end, b.end) < 1e-4;
-    });
-  }
-  if (mine.size() != theirs.size()) {
-    out.problem =
-        std::to_string(mine.size()) + " motions, rs274 has " + std::to_string(theirs.size());
-  }
-  for (std::size_t i = 0; i < std::min(mine.size(), theirs.size()); ++i) {
-    const auto where = "line " + std::to_string(mine[i].line) + ": ";
-    const double off = distance(end_of(mine[i]), theirs[i].end);
+  const auto& theirs_all = oracle.motions;
+  const auto standstill = [&](std::size_t k) {
+    const std::array<double, 6> before = k > 0 ? theirs_all[k - 1].end : std::array<double, 6>{};
+    return !theirs_all[k].arc && distance(before, theirs_all[k].end) < 1e-9;
+  };
+  // rs274 prints a motion to the same place for G0 or G1 without axis words, and G28 without words.
+  std::size_t k = 0;
+  for (const CanonicalMotion& mine : ours) {
+    while (k < theirs_all.size() && standstill(k) &&
+           ((mine.kind == MotionKind::rapid) != theirs_all[k].rapid ||
+            distance(end_of(mine), theirs_all[k].end) > tolerance)) {
+      ++k;
+    }
+    if (k == theirs_all.size()) {
+      out.problem = "line " + std::to_string(mine.line) + ": no such motion in rs274";
+      return out;
+    }
+    const OracleMotion& theirs = theirs_all[k++];
+    const auto where = "line " + std::to_string(mine.line) + ": ";
+    const double off = distance(end_of(mine), theirs.end);
     out.worst = std::max(out.worst, off);
     ++out.motions;
     if (off > tolerance) out.problem = where + "end differs by " + std::to_string(off);
-    if ((mine[i].kind == MotionKind::rapid) != theirs[i].rapid) out.problem = where + "kind";
-    if (mine[i].is_arc != theirs[i].arc) {
+    if ((mine.kind == MotionKind::rapid) != theirs.rapid) out.problem = where + "kind";
+    if (mine.is_arc != theirs.arc) {
       out.problem = where + "arc or not";
-    } else if (mine[i].is_arc) {
+    } else if (mine.is_arc) {
       ++out.arcs;
-      Vec3 apart = mine[i].arc.centre - theirs[i].centre;
-      apart -= apart.dot(mine[i].arc.normal) * mine[i].arc.normal;
+      Vec3 apart = mine.arc.centre - theirs.centre;
+      apart -= apart.dot(mine.arc.normal) * mine.arc.normal;
       if (apart.norm() > 2.0 * tolerance) out.problem = where + "centre";
-      if (!same_turns(mine[i], theirs[i])) out.problem = where + "sweep";
-    } else if (!theirs[i].rapid) {
-      const Vec3 move(mine[i].end[0] - mine[i].start[0], mine[i].end[1] - mine[i].start[1],
-                      mine[i].end[2] - mine[i].start[2]);
-      if (move.norm() > 0.5 && theirs[i].feed_mm_per_min > 1.0) {
+      if (!same_turns(mine, theirs)) out.problem = where + "sweep";
+    } else if (!theirs.rapid) {
+      const Vec3 move(mine.end[0] - mine.start[0], mine.end[1] - mine.start[1],
+                      mine.end[2] - mine.start[2]);
+      if (move.norm() > 0.5 && theirs.feed_mm_per_min > 1.0) {
         ++out.times;
-        const double expected = move.norm() / theirs[i].feed_mm_per_min * 60.0;
-        if (std::abs(mine[i].duration / expected - 1.0) > 1e-3) out.problem = where + "duration";
+        const double expected = move.norm() / theirs.feed_mm_per_min * 60.0;
+        if (std::abs(mine.duration / expected - 1.0) > 1e-3) out.problem = where + "duration";
       }
     }
     if (!out.problem.empty()) return out;
+  }
+  for (; k < theirs_all.size(); ++k) {
+    if (!standstill(k)) out.problem = "rs274 has further motions";
   }
   return out;
 }
