@@ -69,6 +69,8 @@ bool BlockPlanner::plan(const BlockWords& block, const ModalState& modal) {
   plan_.action_count = 0;
   plan_.axes = axis_mask(block.letters);
   if ((block.letters & kAxisLetterMask & ~allowed_axes_) != 0) check_axes(block);
+  // What is wrong with its words was told already; what they would mean is a guess.
+  if (block.bad) return false;
   choose_motion(block, modal);
   constexpr LetterMask kPlain = kAxisLetterMask | letter_bit('F');
   const bool plain = block.m_count == 0 && (block.letters & ~kPlain) == 0;
@@ -81,7 +83,7 @@ bool BlockPlanner::plan(const BlockWords& block, const ModalState& modal) {
   const LetterMask process =
       block.letters & ~kPlain & ~kCentreLetters & ~letter_bit('S') & ~letter_bit('T');
   plan_process(block, process & ~letters_of_g_codes(block));
-  check_non_modal(block, modal);
+  if (good_) check_non_modal(block, modal);
   return good_;
 }
 

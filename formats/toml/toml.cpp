@@ -1,8 +1,8 @@
 #include "formats/toml/toml.h"
 
 // The whole parser in this file, whatever the installed package says: errors as values, no
-// exceptions. Its assertions are off in every build type: "[[[" breaks one, which would abort, or be
-// an assumption for some optimisers; without it a proper error message follows.
+// exceptions. Its assertions are off in every build type: "[[[" breaks one, which would abort, or
+// be an assumption for some optimisers; without it a proper error message follows.
 #undef TOML_HEADER_ONLY
 #undef TOML_SHARED_LIB
 #define TOML_HEADER_ONLY 1

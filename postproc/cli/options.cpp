@@ -41,6 +41,22 @@ void add_part_options(CLI::App* app, CommandLine& l) {
       ->allow_extra_args(false);
 }
 
+// How a CAM program is to be read, and how closely it is to be followed.
+void add_input_options(CLI::App* app, CommandLine& l) {
+  app->add_option("--input-format", l.input_format, "nc | csv");
+  app->add_option("--input-dialect", l.input_dialect, "linuxcnc");
+  app->add_option("--input-machine", l.input_machine,
+                  "the machine that the input was posted for; needed for rotary words");
+  app->add_option("--process", l.process, "TOML with [process.events] in place of the input machine's");
+  app->add_option("--input-work-offset", l.input_work_offset,
+                  "G54=x,y,z[,a,b,c]: the program's zero on the input machine")
+      ->take_all()
+      ->allow_extra_args(false);
+  app->add_option("--tool", l.tool, "N=length in mm, repeatable")->take_all()->allow_extra_args(false);
+  app->add_option("--tip-tolerance", l.tip_tolerance, "mm");
+  app->add_option("--axis-tolerance", l.axis_tolerance, "deg");
+}
+
 void add_convert(CLI::App& app, CommandLine& l) {
   auto* c = app.add_subcommand("convert", "a CAM program to a certified machine program");
   c->footer(kExample);
@@ -49,18 +65,7 @@ void add_convert(CLI::App& app, CommandLine& l) {
   c->add_option("-o,--output", l.output, "the program; - for standard output");
   add_part_options(c, l);
   c->add_option("--dialect", l.dialect, "output dialect instead of the machine's");
-  c->add_option("--input-format", l.input_format, "nc | csv");
-  c->add_option("--input-dialect", l.input_dialect, "linuxcnc");
-  c->add_option("--input-machine", l.input_machine,
-                "the machine that the input was posted for; needed for rotary words");
-  c->add_option("--process", l.process, "TOML with [process.events] in place of the input machine's");
-  c->add_option("--input-work-offset", l.input_work_offset,
-                "G54=x,y,z[,a,b,c]: the program's zero on the input machine")
-      ->take_all()
-      ->allow_extra_args(false);
-  c->add_option("--tool", l.tool, "N=length in mm, repeatable")->take_all()->allow_extra_args(false);
-  c->add_option("--tip-tolerance", l.tip_tolerance, "mm");
-  c->add_option("--axis-tolerance", l.axis_tolerance, "deg");
+  add_input_options(c, l);
   c->add_option("--lead", l.lead, "freedom of the tool axis, deg");
   c->add_option("--tilt", l.tilt, "freedom of the tool axis, deg");
   c->add_option("--smoothing", l.smoothing, "none");
@@ -77,11 +82,12 @@ void add_convert(CLI::App& app, CommandLine& l) {
 }
 
 void add_check(CLI::App& app, CommandLine& l) {
-  auto* c = app.add_subcommand("check", "certify limits of an existing machine program");
+  auto* c = app.add_subcommand("check", "certify an existing machine program");
   c->add_option("program", l.input, "the program; - for standard input")->required();
   add_machine_options(c, l);
   add_part_options(c, l);
-  c->add_option("--against", l.against, "a later version");
+  c->add_option("--against", l.against, "the CAM program that it is to follow: certifies its shape too");
+  add_input_options(c, l);
   add_output_options(c, l);
 }
 

@@ -1,6 +1,7 @@
 #include "postproc/jobs/job.h"
 
 #include <algorithm>
+#include <cmath>
 #include <exception>
 #include <filesystem>
 
@@ -28,6 +29,7 @@ namespace {
 std::string base_name(const std::string& path) { return fs::path(path).filename().string(); }
 
 std::string decimal(double value, int digits) {
+  if (!std::isfinite(value)) return "no bound";
   std::string text;
   append_decimal(text, value, digits);
   return text;
@@ -60,17 +62,13 @@ class Run {
   }
 
   JobResult check_command() {
-    if (!options_.against.empty()) {
-      add(usage_error("US122", "--against is not possible in this version: `convert` compares its own output "
-                               "with its input"));
-      return finish();
-    }
     if (!refuse_later_options() || !load_output_machine() || !load_input()) return finish();
     CheckInput in;
     std::optional<Pose> placement = read_placement(std::nullopt);
     if (!placement || !read_part(in.part, in.part_name)) return finish();
     in.placement = *placement;
     in.text = std::move(input_bytes_);
+    if (!options_.against.empty() && !read_against(in)) return finish();
     in.file_name = input_name_;
     in.machine = machine_.definition;
     context_.input_lines = static_cast<std::size_t>(std::count(in.text.begin(), in.text.end(), '\n'));
@@ -154,27 +152,44 @@ class Run {
   }
 
   bool read_program(ConvertInput& in) {
+    auto input = read_cam_program(input_name_, std::move(input_bytes_));
+    if (!input) return false;
+    in.input = std::move(*input);
+    return true;
+  }
+
+  bool read_against(CheckInput& in) {
+    auto bytes = read_file(options_.against);
+    add(bytes.diagnostics());
+    if (!bytes.ok()) {
+      unreadable_ = true;
+      return false;
+    }
+    in.against = read_cam_program(options_.against, std::move(bytes.value()));
+    return in.against.has_value();
+  }
+
+  std::optional<InterpretedInput> read_cam_program(const std::string& name, std::string bytes) {
     const InputFormat* format = options_.input_format.empty()
-                                    ? format_by_extension(options_.input)
+                                    ? format_by_extension(name)
                                     : find_input_format(options_.input_format);
     if (!format) {
       add(usage_error("US103", options_.input_format.empty()
-                                   ? "the format of " + input_name_ +
+                                   ? "the format of " + name +
                                          " cannot be told from its name: say --input-format nc|csv"
                                    : "--input-format " + options_.input_format +
                                          " is not read in this version; possible: csv, nc"));
-      return false;
+      return {};
     }
     context_.input_format = format->name;
     context_.input_dialect = format->has_words ? "linuxcnc" : "";
     InputSettings settings;
-    settings.file_name = input_name_;
-    if (!input_settings(settings)) return false;
-    auto read = format->read(std::move(input_bytes_), settings);
+    settings.file_name = name;
+    if (!input_settings(settings)) return {};
+    auto read = format->read(std::move(bytes), settings);
     add(read.diagnostics());
-    if (!read.ok()) return false;
-    in.input = std::move(read.value());
-    return true;
+    if (!read.ok()) return {};
+    return std::move(read.value());
   }
 
   bool input_settings(InputSettings& settings) {

@@ -9,6 +9,7 @@
 #include "kernels/geometry/triangle_tree.h"
 #include "postproc/pipeline/joint_plan.h"
 #include "postproc/pipeline/machine_program.h"
+#include "postproc/pipeline/path_match.h"
 #include "postproc/pipeline/registry.h"
 
 namespace smoothpost {
@@ -391,12 +392,53 @@ Conversion convert(const ConvertInput& in, bool force, const Progress& progress)
   return Converter(in, force, progress).run();
 }
 
+namespace {
+
+/// The shape of a program against its input, as checks. The matching bounds the larger of the two shares of
+/// the tolerances, so both deviations are told as that share of theirs.
+Checks shape_checks(const CheckInput& in, const ReadBack& read, const ScrewChain& chain,
+                    const Progress& progress) {
+  const ReferencePath reference(in.against->path, in.against->frames);
+  const auto& tolerance = in.machine.tolerance;
+  const PathMatch match = match_paths(read, chain, reference, {tolerance.tip, tolerance.axis}, progress);
+  const auto check = [&](const char* name, double limit, const char* unit) {
+    Check c;
+    c.name = name;
+    c.limit = limit;
+    c.unit = unit;
+    c.ok = match.matched;
+    c.value = match.matched ? match.share * limit : INFINITY;
+    c.input_line = match.input_line;
+    c.output_line = match.output_line;
+    c.note = match.reason;
+    return c;
+  };
+  return {check("tip_deviation", tolerance.tip, "mm"),
+          check("axis_deviation", degrees_from_radians(tolerance.axis), "deg")};
+}
+
+void tell_failed_checks(Conversion& out, const std::string& file) {
+  for (const Check& c : out.checks)
+    if (!c.ok)
+      out.diagnostics.push_back(diagnostic(
+          "CK101",
+          "check " + c.name + " failed: " + (std::isfinite(c.value) ? std::to_string(c.value) : "no bound") +
+              " " + c.unit + ", limit " + std::to_string(c.limit) + " " + c.unit +
+              (c.input_line > 0 ? ", input line " + std::to_string(c.input_line) : "") +
+              (c.note.empty() ? "" : ". " + c.note),
+          file, static_cast<int>(c.output_line)));
+}
+
+}  // namespace
+
 Conversion check_program(const CheckInput& in, const Progress& progress) {
   Conversion out;
   Stopwatch watch(out.stages);
   describe_promises(in.machine, in.part.has_value(), out);
-  out.not_checked.push_back("tip_deviation");
-  out.not_checked.push_back("axis_deviation");
+  if (!in.against) {
+    out.not_checked.push_back("tip_deviation");
+    out.not_checked.push_back("axis_deviation");
+  }
   const Dialect* dialect = find_dialect(in.machine.dialect.name);
   if (!dialect) {
     out.diagnostics.push_back(diagnostic("US121", "no output dialect \"" + in.machine.dialect.name +
@@ -410,26 +452,26 @@ Conversion check_program(const CheckInput& in, const Progress& progress) {
   if (!read.ok()) return out;
   out.read = std::move(read.value());
   Verification machine = verify_machine(out.read, in.machine);
-  out.checks = std::move(machine.checks);
   out.axes = std::move(machine.axes);
   out.scheduled_time = machine.scheduled_time;
   out.blocks = out.read.moves.size();
+  const ScrewChain chain = placed_chain(in.machine, in.placement);
+  if (in.against) {
+    out.checks = shape_checks(in, out.read, chain, progress);
+    out.reference = in.against->reference;
+    out.assumes.insert(out.assumes.begin(), in.against->assumes.begin(), in.against->assumes.end());
+  }
+  out.checks.insert(out.checks.end(), machine.checks.begin(), machine.checks.end());
   if (in.part) {
     const PartCheck part(*in.part, in.machine);
     append(out.diagnostics, part.diagnostics());
-    const ScrewChain chain = placed_chain(in.machine, in.placement);
     if (part.ok() && !beam_locations(out.read, chain).empty())
       out.checks.push_back(part.output(out.read, chain));
   }
-  progress("verify", 1.0);
   watch.lap("verify");
-  for (const Check& c : out.checks)
-    if (!c.ok)
-      out.diagnostics.push_back(diagnostic(
-          "CK101", "check " + c.name + " failed: " + std::to_string(c.value) + " " + c.unit +
-                       ", limit " + std::to_string(c.limit) + " " + c.unit + (c.note.empty() ? "" : ". " + c.note),
-          in.file_name, static_cast<int>(c.output_line)));
-  out.verdict = has_error(out.diagnostics) ? Verdict::refused : Verdict::limits_only;
+  tell_failed_checks(out, in.file_name);
+  if (has_error(out.diagnostics)) out.verdict = Verdict::refused;
+  else out.verdict = in.against ? Verdict::certified : Verdict::limits_only;
   return out;
 }
 

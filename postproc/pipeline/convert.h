@@ -70,9 +70,11 @@ struct CheckInput {
   Pose placement = Pose::Identity();
   std::optional<TriangleMesh> part;
   std::string part_name;
+  std::optional<InterpretedInput> against;  ///< the input that the program is to follow
 };
 
-/// Certifies an existing machine program against its machine alone: verdict limits_only or refused.
+/// Certifies an existing machine program against its machine: verdict limits_only; with `against` also its
+/// shape, by a monotone matching (path_match.h): verdict certified. Else refused.
 Conversion check_program(const CheckInput& in, const Progress& progress);
 
 }  // namespace smoothpost

@@ -166,7 +166,7 @@ TEST_CASE("arc: turned and shifted with the work system", "[formats][nc][arc]") 
 }
 
 TEST_CASE("arc: inch words", "[formats][nc][arc]") {
-  const Run r = run_lines("G20 F10 G0 X0 Y0\nG3 X2 I1");
+  const Run r = run_lines("G20\nF10 G0 X0 Y0\nG3 X2 I1");
   CHECK(last(r).arc.centre.x() == Approx(25.4));
   CHECK(last(r).duration == Approx(kPi / 10.0 * 60.0));
 }

@@ -294,6 +294,8 @@ class ProgramMaker {
   void line() {
     switch (dice(20)) {
       case 0:
+        // rs274 2.9 leaves an active tool length as a number when the unit changes.
+        put("G49");
         return put(dice(2) ? "G20" : "G21");
       case 1:
         return plane();
@@ -307,8 +309,7 @@ class ProgramMaker {
       case 5:
         return put(dice(3) == 0 ? "G92.1" : dice(2) ? "G92.2" : "G92.3");
       case 6:
-        return put("G10 L2 P" + std::to_string(dice(4)) + word("XYZABC", 30) +
-                   (dice(3) == 0 ? " R" + number(-90, 90) : ""));
+        return work_offset();
       case 7:
         return put("G10 L20 P" + std::to_string(dice(4)) + some_axes());
       case 8:
@@ -332,6 +333,16 @@ class ProgramMaker {
       default:
         return put((dice(3) ? "G1" + feed() : std::string("G0")) + some_axes());
     }
+  }
+
+  /// LinuxCNC 2.9 turns its present position without the G92 shift when G10 L2 changes the
+  /// rotation, so that words which are not programmed next would move; no shift is active here
+  /// (docs/formats_nc.md).
+  void work_offset() {
+    const bool turned = dice(3) == 0;
+    if (turned) put("G92.1");
+    put("G10 L2 P" + std::to_string(dice(4)) + word("XYZABC", 30) +
+        (turned ? " R" + number(-90, 90) : ""));
   }
 
   void plane() {

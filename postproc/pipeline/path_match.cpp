@@ -1,0 +1,262 @@
+#include "postproc/pipeline/path_match.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "kernels/core/contract.h"
+
+namespace smoothpost {
+
+namespace {
+
+constexpr double kStep = 0.25;       // of the tolerances, between samples
+constexpr double kAllowance = 0.02;  // of the tolerances, for curves between samples
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+struct Sample {
+  CutterLocation location;
+  std::uint32_t line = 0;
+};
+
+/// Distances in shares of the tolerances.
+class Metric {
+ public:
+  explicit Metric(const PathMatchSettings& s) : tip_(s.tip_tolerance), axis_(s.axis_tolerance) {}
+  double between(const CutterLocation& a, const CutterLocation& b) const {
+    return std::max((a.tip - b.tip).norm() / tip_, angle_between(a.axis, b.axis) / axis_);
+  }
+  double bend(const SecondDerivativeBound& b) const { return std::max(b.tip / tip_, b.axis / axis_); }
+
+  /// Steps on a curve of that length (upper bound) and bend so that neighbours are kStep apart at most and
+  /// the curve leaves its chords by at most half of kAllowance.
+  int steps(double length, double bend) const {
+    const double by_length = length / kStep;
+    const double by_bend = std::sqrt(bend / (8.0 * 0.5 * kAllowance));
+    return static_cast<int>(std::clamp(std::ceil(std::max(by_length, by_bend)), 1.0, 4.0e6));
+  }
+
+ private:
+  double tip_;
+  double axis_;
+};
+
+/// The program's moves as samples, one after the other, without keeping them.
+class ProgramSamples {
+ public:
+  ProgramSamples(const ReadBack& program, const ScrewChain& chain, const Metric& metric)
+      : program_(program), chain_(chain), metric_(metric) {}
+
+  /// The first move that can be sampled: every joint known before it.
+  std::size_t first_move() const {
+    const JointMask all = (1U << chain_.size()) - 1U;
+    for (std::size_t i = 0; i < program_.moves.size(); ++i)
+      if (program_.moves[i].known == all) return i + 1;
+    return program_.moves.size();
+  }
+
+  /// The tip and axis at the end of move i, with a tool of that length.
+  Sample at_end(std::size_t i, double tool_length) const {
+    return {tip(program_.moves[i].to, tool_length), program_.moves[i].line};
+  }
+
+  /// Samples of move i after its start.
+  std::vector<Sample> of_move(std::size_t i, double tool_length) const {
+    const JointVector& from = program_.moves[i - 1].to;
+    const JointVector& to = program_.moves[i].to;
+    const auto bound = second_derivative_bound(chain_, from, to);
+    const double bend = metric_.bend({bound.tip + tool_length * bound.axis, bound.axis});
+    // Length ≤ chord + what the bend allows on either side of it.
+    const double chord = metric_.between(tip(from, tool_length), tip(to, tool_length));
+    const int n = metric_.steps(chord + bend, bend);
+    std::vector<Sample> samples;
+    samples.reserve(static_cast<std::size_t>(n));
+    for (int k = 1; k <= n; ++k)
+      samples.push_back({tip(from + static_cast<double>(k) / n * (to - from), tool_length),
+                         program_.moves[i].line});
+    return samples;
+  }
+
+ private:
+  CutterLocation tip(const JointVector& q, double tool_length) const {
+    const CutterLocation holder = forward_location(chain_, q);
+    return {holder.tip - tool_length * holder.axis, holder.axis};
+  }
+
+  const ReadBack& program_;
+  const ScrewChain& chain_;
+  const Metric& metric_;
+};
+
+/// One stretch of the input between replanned segments, as samples.
+std::vector<Sample> input_samples(const ReferencePath& input, std::size_t first, std::size_t last,
+                                  const Metric& metric) {
+  const auto& points = input.path().points;
+  std::vector<Sample> samples;
+  samples.push_back({points[first].location, points[first].line});
+  for (std::size_t k = first + 1; k <= last; ++k) {
+    const double bend = metric.bend(input.second_derivative_bound(k));
+    const int n = metric.steps(metric.between(input.at(k, 0.0), input.at(k, 1.0)) + bend, bend);
+    for (int i = 1; i <= n; ++i)
+      samples.push_back({input.at(k, static_cast<double>(i) / n), points[k].line});
+  }
+  return samples;
+}
+
+/// The dynamic programme for one stretch; rows are program samples, columns input samples.
+class Stretch {
+ public:
+  Stretch(const std::vector<Sample>& input, const Metric& metric) : input_(input), metric_(metric) {}
+
+  /// Takes the next program sample; `may_start`: the program has made only rapids since the last stretch.
+  void next(const Sample& sample, bool may_start) {
+    std::vector<double> row;
+    std::size_t first = 0;
+    const std::size_t band_end = first_ + row_.size();  // one column further can be reached diagonally
+    double left = kNever;
+    for (std::size_t j = may_start ? 0 : first_; j < input_.size(); ++j) {
+      double best = std::min({value(j), j > 0 ? value(j - 1) : kNever, left});
+      if (j == 0 && may_start) best = 0.0;
+      double v = kNever;
+      if (best < kNever) {
+        const double d = metric_.between(sample.location, input_[j].location);
+        if (d <= 1.0 - kAllowance) v = std::max(best, d);
+      }
+      left = v;
+      if (row.empty() && v == kNever) {
+        if (j >= band_end) break;
+        continue;
+      }
+      if (row.empty()) first = j;
+      if (v == kNever && j > band_end) break;
+      row.push_back(v);
+    }
+    while (!row.empty() && row.back() == kNever) row.pop_back();
+    row_ = std::move(row);
+    first_ = first;
+    if (!row_.empty() && first_ + row_.size() > furthest_) {
+      furthest_ = first_ + row_.size();
+      furthest_output_ = sample.line;
+    }
+  }
+
+  bool alive() const { return !row_.empty(); }
+  /// The best value of a matching that ends here, or infinity.
+  double finished() const {
+    return !row_.empty() && first_ + row_.size() == input_.size() ? row_.back() : kNever;
+  }
+  std::uint32_t input_line() const { return input_[std::min(furthest_, input_.size() - 1)].line; }
+  std::uint32_t output_line() const { return furthest_output_; }
+
+ private:
+  double value(std::size_t j) const {
+    return j >= first_ && j < first_ + row_.size() ? row_[j - first_] : kNever;
+  }
+
+  const std::vector<Sample>& input_;
+  const Metric& metric_;
+  std::vector<double> row_;  ///< values of columns first_ ...
+  std::size_t first_ = 0;
+  std::size_t furthest_ = 0;
+  std::uint32_t furthest_output_ = 0;
+};
+
+class Matcher {
+ public:
+  Matcher(const ReadBack& program, const ScrewChain& chain, const ReferencePath& input,
+          const PathMatchSettings& settings, const Progress& progress)
+      : program_(program), input_(input), progress_(progress), metric_(settings),
+        samples_(program, chain, metric_) {}
+
+  PathMatch run() {
+    move_ = samples_.first_move();
+    const auto& points = input_.path().points;
+    for (std::size_t first = 0; first < points.size();) {
+      std::size_t last = first;
+      while (last + 1 < points.size() && !points[last + 1].replanned) ++last;
+      if (last > first && !match_stretch(first, last)) return out_;
+      first = last + 1;
+    }
+    // Behind the last stretch only rapids are left.
+    for (std::size_t i = move_; i < program_.moves.size(); ++i)
+      if (!program_.moves[i].rapid)
+        return fail(points.back().line, program_.moves[i].line, "a feed move of the program is not in the input");
+    out_.matched = true;
+    out_.share += kAllowance;
+    return out_;
+  }
+
+ private:
+  bool match_stretch(std::size_t first, std::size_t last) {
+    const double tool_length = input_.path().points[first].tool_length;
+    const std::vector<Sample> wanted = input_samples(input_, first, last, metric_);
+    Stretch stretch(wanted, metric_);
+    bool only_rapids = true;
+    double best = kNever;
+    std::size_t next_move = 0;
+    if (move_ > 0 && move_ <= program_.moves.size())
+      stretch.next(samples_.at_end(move_ - 1, tool_length), true);
+    for (std::size_t i = move_; i < program_.moves.size(); ++i) {
+      if (i % 256 == 0 && !progress_("match", static_cast<double>(i) / static_cast<double>(program_.moves.size()))) {
+        fail(0, 0, "cancelled");
+        return false;
+      }
+      const bool rapid = program_.moves[i].rapid;
+      if (!rapid) only_rapids = false;
+      for (const Sample& sample : samples_.of_move(i, tool_length)) {
+        stretch.next(sample, only_rapids);
+        // A rapid may leave the end of the stretch at any place, and lead on to the next one.
+        if (rapid && stretch.finished() < kNever) {
+          best = stretch.finished();
+          next_move = i;
+        }
+      }
+      // A feed has to end where the stretch ends. The latest such place counts: what follows within the
+      // tolerance still belongs to it.
+      if (stretch.finished() < kNever) {
+        best = stretch.finished();
+        next_move = i + 1;
+      }
+      if (!only_rapids && !stretch.alive()) break;
+    }
+    if (best == kNever) {
+      fail(stretch.input_line(), stretch.output_line(),
+           "the program leaves the input's path here, or a block is missing or doubled");
+      return false;
+    }
+    if (best >= out_.share) {
+      out_.input_line = stretch.input_line();
+      out_.output_line = stretch.output_line();
+    }
+    out_.share = std::max(out_.share, best);
+    move_ = next_move;
+    return true;
+  }
+
+  PathMatch fail(std::uint32_t input_line, std::uint32_t output_line, std::string reason) {
+    out_.matched = false;
+    out_.input_line = input_line;
+    out_.output_line = output_line;
+    out_.reason = std::move(reason);
+    return out_;
+  }
+
+  const ReadBack& program_;
+  const ReferencePath& input_;
+  const Progress& progress_;
+  Metric metric_;
+  ProgramSamples samples_;
+  std::size_t move_ = 0;
+  PathMatch out_;
+};
+
+}  // namespace
+
+PathMatch match_paths(const ReadBack& program, const ScrewChain& chain, const ReferencePath& input,
+                      const PathMatchSettings& settings, const Progress& progress) {
+  require(settings.tip_tolerance > 0.0 && settings.axis_tolerance > 0.0, "positive tolerances");
+  return Matcher(program, chain, input, settings, progress).run();
+}
+
+}  // namespace smoothpost
