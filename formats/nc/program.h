@@ -5,6 +5,8 @@
 #include <string_view>
 #include <vector>
 
+#include "formats/nc/large_pages.h"
+
 namespace smoothpost::nc {
 
 /// What a piece of program text is. The pieces of a program tile its text: every byte is in exactly
@@ -41,7 +43,7 @@ struct Program {
   std::string file_name;
   std::string text;
   std::vector<Block> blocks;
-  std::vector<Piece> pieces;
+  std::vector<Piece, LargePageAllocator<Piece>> pieces;
 };
 
 /// The text of the program, put together from its pieces: equal to the text that was parsed, byte

@@ -163,7 +163,7 @@ void describe_promises(const MachineDefinition& machine, bool has_part, Conversi
   std::string assumed;
   for (const auto& axis : machine.axes)
     if (axis.source == LimitSource::assumed) assumed += (assumed.empty() ? "" : ", ") + axis.name;
-  if (!assumed.empty()) out.assumes.push_back("the limits of these axes are assumed, not from a datasheet: " + assumed);
+  if (!assumed.empty()) out.assumes.push_back("the limits of these axes are assumed, not from a datasheet, and used at 90 %: " + assumed);
 }
 
 }  // namespace

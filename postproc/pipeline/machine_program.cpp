@@ -154,7 +154,9 @@ class Builder {
     for (int j = 0; j < machine_.size(); ++j) {
       const auto& axis = machine_.axes[static_cast<std::size_t>(j)];
       const double step = std::abs(move.to[j] - from[j]);
-      time = std::max(time, step / (axis.velocity * machine_.tolerance.limit_share));
+      const double share =
+          machine_.tolerance.limit_share * (axis.source == LimitSource::assumed ? kAssumedShare : 1.0);
+      time = std::max(time, step / (axis.velocity * share));
       // A feed that turns the tool in place and says no time: a moderate rate.
       if (point.duration == 0.0 && point.kind == MotionKind::feed &&
           axis.joint.kind == JointKind::rotary)

@@ -1,5 +1,6 @@
 #include "postproc/pipeline/reference_path.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "kernels/core/contract.h"
@@ -137,12 +138,13 @@ double ReferencePath::length(std::size_t segment) const {
   const PathPoint& to = path_.points[segment];
   if (to.interpolation != PathInterpolation::joint_linear && !to.is_arc)
     return (to.location.tip - from.location.tip).norm();
-  // Enough chords that each turns little; the length is for reports, not for certificates.
-  constexpr int kChords = 64;
+  // Chords that leave the curve by 1 µm at most; the length is for reports and sampling steps.
+  const double bend = second_derivative_bound(segment).tip;
+  const int chords = static_cast<int>(std::clamp(std::ceil(std::sqrt(bend / 8e-3)), 1.0, 256.0));
   double length = 0.0;
   Vec3 last = at(segment, 0.0).tip;
-  for (int i = 1; i <= kChords; ++i) {
-    const Vec3 next = at(segment, static_cast<double>(i) / kChords).tip;
+  for (int i = 1; i <= chords; ++i) {
+    const Vec3 next = at(segment, static_cast<double>(i) / chords).tip;
     length += (next - last).norm();
     last = next;
   }

@@ -4,14 +4,13 @@
     compare_path.py LOG MACHINE.toml PLAN [--tip 0.01] [--axis 0.05] [--tool-length 0]
 
 LOG comes from run_program.py. PLAN is the program itself (joints linear from block to block) or a
-trajectory CSV (joints linear from sample to sample). Both sides go through the forward kinematics
-of machine_model.py. For every executed sample the nearest pose of the plan is found among the
-blocks near the one that the controller was executing (for a CSV: near the same path length), so
-that a match cannot jump to another pass of the tool, and for every block end of the plan the
-nearest executed pose; for a CSV, whose rows cut the corners between them, only the latter
-decides. Nearest is in the norm that adds the squares of tip distance over --tip and axis angle
-over --axis; the tip distance and the angle at that match are reported. Plan motions are cut so
-finely that poses between the cuts are linear to 0.0001 mm.
+trajectory CSV (*.csv). Both sides go through the forward kinematics of machine_model.py. For every
+executed sample the nearest pose of the program is found among the blocks near the one that the
+controller was executing, so that a match cannot jump to another pass of the tool, and for every block
+end of the program the nearest executed pose. Of a CSV every row is looked for in the executed path, in
+order. Nearest is in the norm that adds the squares of tip distance over --tip and axis angle over
+--axis; the tip distance and the angle at that match are reported. Motions are cut so finely that
+poses between the cuts are linear to 0.0001 mm.
 
 Exit status: 0 within both tolerances, 1 over one of them, 2 usage or unreadable input.
 """
@@ -27,8 +26,6 @@ from machine_model import Machine, axis_angle_deg, fail
 
 CHORD = 1e-4        # mm, linearity of the pieces of the plan
 BLOCKS_AROUND = 3   # blocks before and after the executed one among which a match is sought
-LENGTH_SLACK = 0.5  # mm of path, for a plan without line numbers
-LENGTH_ERROR = 1e-4
 PAIRS_AT_ONCE = 400_000
 
 
@@ -62,7 +59,7 @@ class Log:
 class Plan:
     """Polyline of joint vectors; `block[i]` numbers the motion from vertex i to vertex i + 1."""
 
-    def __init__(self, joints, rapid, durations, lines=None):
+    def __init__(self, joints, rapid, durations, lines):
         self.joints, self.rapid, self.durations, self.lines = joints, rapid, durations, lines
 
     @staticmethod
@@ -71,12 +68,6 @@ class Plan:
         moves = program.moves
         return Plan(program.joints(), np.array([m.rapid for m in moves], bool),
                     np.array([m.duration for m in moves]), np.array([m.line for m in moves]))
-
-    @staticmethod
-    def of_trajectory(trajectory):
-        joints = trajectory.joints
-        return Plan(joints, np.zeros(len(joints) - 1, bool), np.diff(trajectory.time))
-
 
 class Trajectory:
     """A trajectory CSV of the tool: t_s, axes with units, x_mm,y_mm,z_mm,i,j,k,beam."""
@@ -173,37 +164,10 @@ def block_of_samples(log, plan):
     return np.clip(np.searchsorted(plan.lines, line), 0, len(plan.lines) - 1)
 
 
-def length_along(points):
-    """Path length in pose space up to each point."""
-    return np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))]
-
-
-def blocks_by_length(points, pieces):
-    """The first and last block of each sample, for a plan without line numbers, by path length.
-
-    Both sides are the same path when the comparison succeeds, so the lengths from the start agree
-    but for the chords of the sampling.
-    """
-    executed, planned = length_along(points), length_along(pieces.points)
-    slack = LENGTH_SLACK + LENGTH_ERROR * executed
-    last = len(pieces.block) - 1
-    first = np.clip(np.searchsorted(planned, executed - slack) - 1, 0, last)
-    final = np.clip(np.searchsorted(planned, executed + slack), 0, last)
-    return pieces.block[first], pieces.block[final]
-
-
 def runs_of(first, final):
     """Slices of consecutive samples with the same two values."""
     edges = np.flatnonzero((np.diff(first) != 0) | (np.diff(final) != 0)) + 1
     return [slice(a, b) for a, b in zip(np.r_[0, edges], np.r_[edges, len(first)]) if b > a]
-
-
-def first_at(plan, log, moving, machine, tool_length):
-    """The first sample at the start of a plan that begins later than the program does."""
-    distance = np.linalg.norm(machine.poses(log.joints[moving], tool_length, 1.0)
-                              - machine.poses(plan.joints[:1], tool_length, 1.0), axis=1)
-    near = np.flatnonzero(distance < max(1e-3, 1.001 * float(np.min(distance))))
-    return moving.start + int(near[0])
 
 
 class Comparison:
@@ -213,19 +177,13 @@ class Comparison:
         tip, axis_deg = tolerance
         weight = tip / math.radians(axis_deg)
         moving = log.moving()
-        if plan.lines is None:
-            moving = slice(first_at(plan, log, moving, machine, tool_length), moving.stop)
         self.samples = moving.stop - moving.start
         self.executed, self.covered = Deviation(weight), Deviation(weight)
         pieces = Pieces(plan, machine, tool_length, weight)
         points = machine.poses(log.joints[moving], tool_length, weight)
         blocks = len(plan.joints) - 1
-        if plan.lines is not None:
-            block = block_of_samples(log, plan)[moving]
-            bounds = np.maximum(block - BLOCKS_AROUND, 0), np.minimum(block + BLOCKS_AROUND, blocks - 1)
-        else:
-            bounds = blocks_by_length(points, pieces)
-            block = bounds[0]
+        block = block_of_samples(log, plan)[moving]
+        bounds = np.maximum(block - BLOCKS_AROUND, 0), np.minimum(block + BLOCKS_AROUND, blocks - 1)
         for run in runs_of(*bounds):
             first, last = pieces.first[bounds[0][run.start]], pieces.first[bounds[1][run.start] + 1]
             _, feet = nearest(points[run], pieces.points[first:last], pieces.points[first + 1:last + 1])
@@ -252,20 +210,15 @@ class Comparison:
 
 
 def report(comparison, plan, tolerance):
-    """Prints the comparison; true when it is within the tolerances.
-
-    Samples of a CSV lie on the path but the lines between them cut its corners: then only the way
-    from plan to execution decides.
-    """
-    where = lambda label: ("" if label is None else f" (line {plan.lines[label]})"
-                           if plan.lines is not None else f" (sample {label})")
+    """Prints the comparison; true when it is within the tolerances."""
     ok = True
     for name, deviation in (("executed to plan", comparison.executed),
                             ("plan to executed", comparison.covered)):
-        decides = plan.lines is not None or name == "plan to executed"
-        ok = ok and (not decides or (deviation.tip <= tolerance[0] and deviation.axis <= tolerance[1]))
-        print(f"{name}: tip {deviation.tip:.5f} mm{where(deviation.tip_at)}, "
-              f"axis {deviation.axis:.5f} deg{where(deviation.axis_at)}")
+        ok = ok and deviation.tip <= tolerance[0] and deviation.axis <= tolerance[1]
+        places = [f" (line {plan.lines[label]})" if label is not None else ""
+                  for label in (deviation.tip_at, deviation.axis_at)]
+        print(f"{name}: tip {deviation.tip:.5f} mm{places[0]}, "
+              f"axis {deviation.axis:.5f} deg{places[1]}")
     ratio = comparison.executed_time / comparison.planned if comparison.planned else math.nan
     print(f"samples {comparison.samples}, blocks {len(plan.joints) - 1}, feed time"
           f" {comparison.executed_time:.3f} s of {comparison.planned:.3f} s planned"
@@ -274,15 +227,57 @@ def report(comparison, plan, tolerance):
     return ok
 
 
-def compare(log_path, machine, plan_path, tolerance=(0.01, 0.05), tool_length=0.0):
+def first_within(points, start, row, reach):
+    """The first segment of the executed path from `start` on that comes within `reach` of `row`.
+
+    From there on to the nearest one as long as it comes nearer. Returns (segment, foot) or None.
+    """
+    length = 64
+    while True:
+        stop = min(len(points) - 1, start + length)
+        along = points[start + 1:stop + 1] - points[start:stop]
+        length2 = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
+        share = np.clip(np.einsum("ij,ij->i", row - points[start:stop], along) / length2, 0.0, 1.0)
+        feet = points[start:stop] + share[:, None] * along
+        distance = np.linalg.norm(feet - row, axis=1)
+        near = np.flatnonzero(distance <= reach)
+        if len(near) and (near[0] + 32 < len(distance) or stop == len(points) - 1):
+            at = int(near[0])
+            while at + 1 < len(distance) and distance[at + 1] < distance[at]:
+                at += 1
+            return start + at, feet[at]
+        if stop == len(points) - 1:
+            return None
+        length *= 2
+
+
+def compare_trajectory(log, machine, trajectory, tolerance, tool_length=0.0):
+    """Whether the rows of a trajectory CSV were executed, in their order; printed.
+
+    Rows lie on the path, lines between them cut its corners: so rows are looked for in the executed
+    path, each not before the one in front of it, and not the other way round.
+    """
+    weight = tolerance[0] / math.radians(tolerance[1])
+    points = machine.poses(log.joints[log.moving()], tool_length, weight)
+    rows = machine.poses(trajectory.joints, tool_length, weight)
+    deviation, at = Deviation(weight), 0
+    for index, row in enumerate(rows):
+        found = first_within(points, at, row, tolerance[0])
+        if found is None:
+            print(f"row {index} (t = {trajectory.time[index]:.4f} s) was not executed after the others")
+            return False
+        at, foot = found
+        deviation.add(row[None, :], foot[None, :], [index])
+    print(f"{len(rows)} rows to executed: tip {deviation.tip:.5f} mm, axis {deviation.axis:.5f} deg")
+    return deviation.tip <= tolerance[0] and deviation.axis <= tolerance[1]
+
+
+def compare(log_path, machine, program, tolerance=(0.01, 0.05), tool_length=0.0):
     """(within, comparison), printed. Raises ValueError for input that cannot be compared."""
     log = Log(log_path, machine)
     if log.moving().stop == 0:
         raise ValueError(f"{log_path}: no motion was made")
-    if plan_path.endswith(".csv"):
-        plan = Plan.of_trajectory(Trajectory(plan_path, machine))
-    else:
-        plan = Plan.of_program(plan_path, machine, log.joints[0])
+    plan = Plan.of_program(program, machine, log.joints[0])
     comparison = Comparison(log, machine, plan, tolerance, tool_length)
     return report(comparison, plan, tolerance), comparison
 
@@ -297,8 +292,14 @@ def main():
     parser.add_argument("--tool-length", type=float, default=0.0, help="mm")
     arguments = parser.parse_args()
     try:
-        ok, _ = compare(arguments.log, Machine(arguments.machine), arguments.plan,
-                        (arguments.tip, arguments.axis), arguments.tool_length)
+        machine, tolerance = Machine(arguments.machine), (arguments.tip, arguments.axis)
+        if arguments.plan.endswith(".csv"):
+            ok = compare_trajectory(Log(arguments.log, machine), machine,
+                                    Trajectory(arguments.plan, machine), tolerance,
+                                    arguments.tool_length)
+        else:
+            ok, _ = compare(arguments.log, machine, arguments.plan, tolerance,
+                            arguments.tool_length)
     except (OSError, ValueError, KeyError) as error:
         fail(f"compare_path.py: {error}")
     sys.exit(0 if ok else 1)

@@ -17,6 +17,7 @@ struct OracleMotion {
   std::array<double, 6> end{};  ///< X Y Z A B C
   Vec3 centre = Vec3::Zero();   ///< of an arc; the coordinate along the normal is the end's
   double feed_mm_per_min = 0.0;
+  double tool_z = 0.0;  ///< active tool length, mm
 };
 
 struct OracleRun {

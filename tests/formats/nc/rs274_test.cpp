@@ -51,6 +51,8 @@ class CanonicalReader {
     } else if (is("SET_XY_ROTATION")) {
       rotation_ = radians_from_degrees(values.at(0));
       run_.rotated = run_.rotated || rotation_ != 0.0;
+    } else if (is("USE_TOOL_LENGTH_OFFSET")) {
+      tool_z_ = values.at(2) * unit_;
     } else if (is("SELECT_PLANE")) {
       plane_ = is("_XZ") ? 1 : is("_YZ") ? 2 : 0;
     } else if (is("SET_FEED_RATE")) {
@@ -98,6 +100,7 @@ class CanonicalReader {
     for (int i = 0; i < 3; ++i) motion.end[static_cast<std::size_t>(i)] = end[i];
     for (std::size_t i = 3; i < 6; ++i) motion.end[i] = program_[i] + g92_[i] + g5x_[i];
     motion.feed_mm_per_min = feed_;
+    motion.tool_z = tool_z_;
     run_.motions.push_back(motion);
   }
 
@@ -108,6 +111,7 @@ class CanonicalReader {
   double rotation_ = 0.0;
   double unit_ = 1.0;
   double feed_ = 0.0;
+  double tool_z_ = 0.0;
   int plane_ = 0;
 };
 
@@ -204,9 +208,14 @@ Comparison compare(const std::vector<CanonicalMotion>& ours, const OracleRun& or
   const double digit = (oracle.inch ? kMillimetresPerInch : 1.0) * 1e-4;
   const double tolerance = oracle.rotated || oracle.inch ? 3.0 * digit : 1.01 * digit;
   const auto& theirs_all = oracle.motions;
+  const auto machine = [&](std::size_t k) {
+    std::array<double, 6> end = theirs_all[k].end;
+    end[2] += theirs_all[k].tool_z;
+    return end;
+  };
   const auto standstill = [&](std::size_t k) {
-    const std::array<double, 6> before = k > 0 ? theirs_all[k - 1].end : std::array<double, 6>{};
-    return !theirs_all[k].arc && distance(before, theirs_all[k].end) < 1e-9;
+    const std::array<double, 6> before = k > 0 ? machine(k - 1) : std::array<double, 6>{};
+    return !theirs_all[k].arc && distance(before, machine(k)) < 2.0 * tolerance;
   };
   // rs274 prints a motion to the same place for G0 or G1 without axis words, and G28 without words.
   std::size_t k = 0;
