@@ -9,12 +9,13 @@
 
 #include "kernels/core/pose.h"
 
-// What an NC program asks a machine to do, after all modal state, units and offsets are resolved and
-// before any kinematics. Readers of every dialect produce these calls; `postproc/pipeline/interpret`
-// turns them into a ToolPath with the input machine's kinematics.
+// What an NC program asks a machine to do, after all modal state, units and offsets are resolved
+// and before any kinematics. Readers of every dialect produce these calls;
+// `postproc/pipeline/interpret` turns them into a ToolPath with the input machine's kinematics.
 namespace smoothpost {
 
-/// The axis words of RS274NGC in their fixed order: X Y Z A B C U V W. X Y Z U V W in mm, A B C in rad.
+/// The axis words of RS274NGC in their fixed order: X Y Z A B C U V W. X Y Z U V W in mm, A B C in
+/// rad.
 inline constexpr int kAxisWords = 9;
 inline constexpr std::string_view kAxisLetters = "XYZABCUVW";
 using AxisWords = std::array<double, kAxisWords>;
@@ -24,8 +25,8 @@ using AxisMask = std::uint16_t;
 
 enum class MotionKind : std::uint8_t { rapid, feed };
 
-/// A circular arc or helix: from the motion's start, `sweep` rad (signed, right-hand about `normal`)
-/// about `centre`, while the position along `normal` goes linearly to the end's.
+/// A circular arc or helix: from the motion's start, `sweep` rad (signed, right-hand about
+/// `normal`) about `centre`, while the position along `normal` goes linearly to the end's.
 struct ArcGeometry {
   Vec3 centre = Vec3::Zero();
   Vec3 normal = Vec3::UnitZ();
@@ -33,8 +34,8 @@ struct ArcGeometry {
 };
 
 /// One motion of the controlled point. `start` and `end` are in the input controller's world
-/// coordinates: work offset (G54.., G52, G92, XY rotation) added, tool length NOT added. All axis words
-/// move linearly in the motion's parameter s ∈ [0, 1], except X Y Z of an arc.
+/// coordinates: work offset (G54.., G52, G92, XY rotation) added, tool length NOT added. All axis
+/// words move linearly in the motion's parameter s ∈ [0, 1], except X Y Z of an arc.
 struct CanonicalMotion {
   MotionKind kind = MotionKind::feed;
   bool is_arc = false;
@@ -42,10 +43,10 @@ struct CanonicalMotion {
   bool machine_position = false;  ///< G53, G28, G30: a place of the input machine, not of the part
   AxisMask unknown_start = 0;     ///< words that the program has not yet given a value
   AxisMask unknown_end = 0;
-  AxisMask programmed = 0;        ///< words written in this block
-  std::uint32_t line = 0;         ///< 1-based line of the input
+  AxisMask programmed = 0;  ///< words written in this block
+  std::uint32_t line = 0;   ///< 1-based line of the input
   std::uint32_t column = 0;
-  double duration = 0.0;          ///< s at the programmed feed; 0 for a rapid
+  double duration = 0.0;  ///< s at the programmed feed; 0 for a rapid
   AxisWords start{};
   AxisWords end{};
   ArcGeometry arc;
@@ -53,7 +54,7 @@ struct CanonicalMotion {
 
 /// A process event by its name in the machine file's table, with the values found in the words.
 struct ProcessEvent {
-  std::string name;                                             ///< beam_on, spindle_on, tool_change ...
+  std::string name;  ///< beam_on, spindle_on, tool_change ...
   std::vector<std::pair<std::string, std::string>> parameters;  ///< {"rpm", "630"}
   std::uint32_t line = 0;
   std::uint32_t column = 0;

@@ -7,7 +7,8 @@
 namespace smoothpost {
 
 /// One statement about the output, with the place where it is tightest. `value` and `limit` are in
-/// `unit` (a unit for people: mm, deg, s); `planned`: true of our plan, not promised of the controller.
+/// `unit` (a unit for people: mm, deg, s); `planned`: true of our plan, not promised of the
+/// controller.
 struct Check {
   std::string name;
   double value = 0.0;

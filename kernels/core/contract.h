@@ -6,7 +6,8 @@
 
 namespace smoothpost {
 
-/// A caller broke a documented precondition. Thrown in all build types; never the fault of a user's file.
+/// A caller broke a documented precondition. Thrown in all build types; never the fault of a user's
+/// file.
 class ContractViolation : public std::logic_error {
  public:
   using std::logic_error::logic_error;

@@ -15,7 +15,8 @@ struct SourceLocation {
 };
 
 /// One message for the user: what is wrong, the value with its unit, the limit, what to do.
-/// `code` is stable and listed in docs/diagnostics.md; its two-letter family decides the exit status.
+/// `code` is stable and listed in docs/diagnostics.md; its two-letter family decides the exit
+/// status.
 struct Diagnostic {
   Severity severity = Severity::error;
   std::string code;

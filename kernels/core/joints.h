@@ -6,7 +6,8 @@ namespace smoothpost {
 
 inline constexpr int kMaxJoints = 12;
 
-/// One value per axis, in the order of the machine file: mm (linear) or rad (rotary). No allocation.
+/// One value per axis, in the order of the machine file: mm (linear) or rad (rotary). No
+/// allocation.
 using JointVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxJoints, 1>;
 
 /// Limits per axis, in the order of the machine file: mm or rad, and their derivatives by s.

@@ -56,7 +56,9 @@ Vec3 rotation_log(const Mat3& r) {
   return angle * axis;
 }
 
-double angle_between(const Vec3& a, const Vec3& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
+double angle_between(const Vec3& a, const Vec3& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
 
 Vec3 great_circle(const Vec3& a, const Vec3& b, double t) {
   const double angle = angle_between(a, b);

@@ -29,7 +29,8 @@ Vec3 rotation_log(const Mat3& rotation);
 double angle_between(const Vec3& a, const Vec3& b);
 
 /// Point at share t ∈ [0, 1] of the great circle from unit vector a to unit vector b.
-/// Opposite vectors have no unique great circle: then the plane is that of `Vec3::unitOrthogonal(a)`.
+/// Opposite vectors have no unique great circle: then the plane is that of
+/// `Vec3::unitOrthogonal(a)`.
 Vec3 great_circle(const Vec3& a, const Vec3& b, double t);
 
 /// q or −q (the same rotation), whichever lies in the half sphere of `reference`.

@@ -8,8 +8,8 @@
 
 namespace smoothpost {
 
-/// A value, or the reasons why there is none. A result with a value may carry warnings and notes; one
-/// without a value carries at least one error.
+/// A value, or the reasons why there is none. A result with a value may carry warnings and notes;
+/// one without a value carries at least one error.
 template <class T>
 class Result {
  public:

@@ -28,16 +28,18 @@ struct PathPoint {
   MotionKind kind = MotionKind::rapid;  ///< of the segment that ends here; the first point has none
   PathInterpolation interpolation = PathInterpolation::great_circle;
   bool is_arc = false;
-  bool beam = false;       ///< beam on during the segment that ends here
-  bool replanned = false;  ///< the way here is a link of ours: the input's own way has no meaning elsewhere
+  bool beam = false;  ///< beam on during the segment that ends here
+  bool replanned =
+      false;  ///< the way here is a link of ours: the input's own way has no meaning elsewhere
   std::uint32_t line = 0;
-  double duration = 0.0;  ///< s at the programmed feed, 0 for a rapid
-  AxisWords words{};      ///< input axis words at this point (rotary_linear, joint_linear)
-  std::int32_t arc = -1;       ///< index into ToolPath::arcs when is_arc
-  double compensation = 0.0;   ///< mm, the tool length that the input's controller has active
-  double tip_offset = 0.0;     ///< mm from the controlled point of `words` to the tip, against the axis
-  double tool_length = 0.0;    ///< mm, of the tool in use: from the holder's reference to the tip
-  std::int32_t tool = 0;       ///< its number; 0: the machine's fixed tool
+  double duration = 0.0;      ///< s at the programmed feed, 0 for a rapid
+  AxisWords words{};          ///< input axis words at this point (rotary_linear, joint_linear)
+  std::int32_t arc = -1;      ///< index into ToolPath::arcs when is_arc
+  double compensation = 0.0;  ///< mm, the tool length that the input's controller has active
+  double tip_offset =
+      0.0;  ///< mm from the controlled point of `words` to the tip, against the axis
+  double tool_length = 0.0;  ///< mm, of the tool in use: from the holder's reference to the tip
+  std::int32_t tool = 0;     ///< its number; 0: the machine's fixed tool
 };
 
 /// A process event, dwell or comment that happens when the path has reached `point`

@@ -2,8 +2,8 @@
 
 #include <numbers>
 
-// Millimetre, radian and second are the only units inside kernels/. These factors are for the floors
-// above, which meet degrees, inches, minutes and metres in files.
+// Millimetre, radian and second are the only units inside kernels/. These factors are for the
+// floors above, which meet degrees, inches, minutes and metres in files.
 namespace smoothpost {
 
 inline constexpr double kPi = std::numbers::pi;

@@ -65,14 +65,14 @@ struct ReadBackMove {
   JointVector to;
   JointMask known = 0;  ///< joints whose position the program has set by the end of this move
   bool rapid = false;
-  bool beam = false;  ///< beam on while it moves
+  bool beam = false;      ///< beam on while it moves
   double duration = 0.0;  ///< s, from F; 0 for a rapid
   std::uint32_t line = 0;
 };
 
 struct ReadBackEvent {
   std::size_t before = 0;
-  std::string name;   ///< event, or "dwell"
+  std::string name;  ///< event, or "dwell"
   double seconds = 0.0;
   bool beam = false;  ///< beam on after the event
   std::uint32_t line = 0;

@@ -16,8 +16,9 @@ namespace {
 
 constexpr std::size_t kMaxCommentLength = 200;  // LinuxCNC refuses lines over 255 characters
 
-// The offsets that must be zero when joint words are run: active work offset (and its rotation), G92
-// and tool offset, all nine axes each (parameters of the RS274NGC interpreter as LinuxCNC numbers them).
+// The offsets that must be zero when joint words are run: active work offset (and its rotation),
+// G92 and tool offset, all nine axes each (parameters of the RS274NGC interpreter as LinuxCNC
+// numbers them).
 std::vector<std::string> guard_lines() {
   std::vector<std::string> lines;
   const auto sum = [](int first, int count) {
@@ -33,7 +34,8 @@ std::vector<std::string> guard_lines() {
     lines.push_back("o" + label + " endif");
   };
   refuse("101", "[" + sum(5221, 10) + "] GT 0.0000001",
-         "G54 is not zero. This program is in machine joints: clear G54 with G10 L2 P1 R0 X0 Y0 Z0 A0 B0 "
+         "G54 is not zero. This program is in machine joints: clear G54 with G10 L2 P1 R0 X0 Y0 Z0 "
+         "A0 B0 "
          "C0 U0 V0 W0");
   refuse("102", "[#5210*[" + sum(5211, 9) + "]] GT 0.0000001",
          "a G92 or G52 offset is active. Clear it with G92.1");
@@ -46,10 +48,14 @@ std::vector<std::string> guard_lines() {
 std::string comment_text(std::string_view text) {
   std::string out;
   for (const char c : text.substr(0, kMaxCommentLength)) {
-    if (c == '(') out += '[';
-    else if (c == ')') out += ']';
-    else if (static_cast<unsigned char>(c) < 0x20) out += ' ';
-    else out += c;
+    if (c == '(')
+      out += '[';
+    else if (c == ')')
+      out += ']';
+    else if (static_cast<unsigned char>(c) < 0x20)
+      out += ' ';
+    else
+      out += c;
   }
   // A cut inside a UTF-8 sequence would leave half a character.
   while (text.size() > kMaxCommentLength && !out.empty() &&
@@ -93,13 +99,15 @@ class Emitter {
  private:
   void header() {
     put_line("%");
-    if (!program_.certified) put_line("(NOT CERTIFIED. Written with --force: read the report before you run it)");
+    if (!program_.certified)
+      put_line("(NOT CERTIFIED. Written with --force: read the report before you run it)");
     for (const auto& line : program_.title) put_line("(" + comment_text(line) + ")");
     const bool inch = machine_.dialect.units == "inch";
     if (machine_.dialect.start.empty())
       put_line(std::string(inch ? "G20" : "G21") + " G17 G90 G91.1 G94 G40 G49 G80 G92.1 G54");
     for (const auto& line : machine_.dialect.start) put_line(line);
-    // Where the template does not say so itself: units, absolute, no compensation, G54, no blending.
+    // Where the template does not say so itself: units, absolute, no compensation, G54, no
+    // blending.
     put_line(std::string(inch ? "G20" : "G21") + " G90 G94 G40 G49 G80 G92.1 G54");
     put_line(machine_.dialect.path_mode == "exact" ? "G61" : "G64 P0.001 Q0");
     if (machine_.dialect.offset_guard)
@@ -145,8 +153,9 @@ class Emitter {
   }
 
   void print_event(const MachineAction& action) {
-    const auto row = std::find_if(machine_.process.events.begin(), machine_.process.events.end(),
-                                  [&](const EventWords& e) { return e.event == action.event.name; });
+    const auto row =
+        std::find_if(machine_.process.events.begin(), machine_.process.events.end(),
+                     [&](const EventWords& e) { return e.event == action.event.name; });
     if (row == machine_.process.events.end()) return unmapped(action);
     const auto text = nc::render_event(*row, action.event.parameters);
     if (!text.ok()) {
@@ -194,8 +203,10 @@ class Emitter {
     set_time_mode(!move.rapid);
     number(move.input_line);
     if (move.machine_coordinates) out_.text += "G53 ";
-    if (move.rapid) out_.text += "G0";
-    else out_.text += "G1";
+    if (move.rapid)
+      out_.text += "G0";
+    else
+      out_.text += "G1";
     out_.text += words;
     if (!move.rapid) {
       out_.text += " F";
@@ -206,13 +217,16 @@ class Emitter {
     out_.move_lines.push_back(line_);
   }
 
-  // Words that would print the same digits as before are left out, except when nothing else is left.
+  // Words that would print the same digits as before are left out, except when nothing else is
+  // left.
   void axis_word(std::string& words, int j, double value) {
     const auto& axis = machine_.axes[static_cast<std::size_t>(j)];
     const bool rotary = axis.joint.kind == JointKind::rotary;
     std::string word(1, axis.letter);
-    if (rotary) append_decimal(word, degrees_from_radians(value), machine_.dialect.digits_angle);
-    else append_decimal(word, value * length_scale_, machine_.dialect.digits_length);
+    if (rotary)
+      append_decimal(word, degrees_from_radians(value), machine_.dialect.digits_angle);
+    else
+      append_decimal(word, value * length_scale_, machine_.dialect.digits_length);
     auto& last = printed_[static_cast<std::size_t>(j)];
     if (last == word) return;
     words += ' ';
@@ -263,7 +277,8 @@ class ReadBackSink : public CanonicalSink {
   }
   void comment(std::string_view, std::uint32_t) override {}
   void tool_length(double length, int, std::uint32_t line) override {
-    if (length != 0.0) error(line, "tool length compensation is active in a program of joint words");
+    if (length != 0.0)
+      error(line, "tool length compensation is active in a program of joint words");
   }
   void work_offset(const Vec3& origin, double rotation, int system, std::uint32_t line) override {
     if (system != 1 || origin.norm() > 0.0 || rotation != 0.0)
@@ -304,8 +319,8 @@ bool take_guard(std::string& text) {
   return true;
 }
 
-// Exact path holds when the first path mode word stands before the first motion, is G61, and no other
-// path mode follows.
+// Exact path holds when the first path mode word stands before the first motion, is G61, and no
+// other path mode follows.
 bool is_exact_path(const nc::Program& program) {
   bool exact = false;
   for (const auto& piece : program.pieces) {
@@ -327,7 +342,8 @@ Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
                            const std::string& file_name) {
   const bool guard = take_guard(text);
   auto parsed = nc::parse(std::move(text), file_name);
-  if (has_error(parsed.diagnostics)) return Result<ReadBack>::failure(std::move(parsed.diagnostics));
+  if (has_error(parsed.diagnostics))
+    return Result<ReadBack>::failure(std::move(parsed.diagnostics));
   nc::InterpreterSettings settings;
   settings.inch_default = machine.dialect.units == "inch";
   settings.has_tcp = false;
@@ -352,9 +368,9 @@ Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
   return Result<ReadBack>(std::move(sink.result), std::move(diagnostics));
 }
 
-const Dialect kDialect = {
-    "linuxcnc", "LinuxCNC 2.9, joint words (trivkins), G93, exact path",
-    "all joints linear between blocks, exact path (G61): the controller stops blending at block ends",
-    &emit, &read_back};
+const Dialect kDialect = {"linuxcnc", "LinuxCNC 2.9, joint words (trivkins), G93, exact path",
+                          "all joints linear between blocks, exact path (G61): the controller "
+                          "stops blending at block ends",
+                          &emit, &read_back};
 
 }  // namespace smoothpost::linuxcnc

@@ -28,7 +28,8 @@ std::vector<std::string> list(const char* const* values, size_t count) {
   return out;
 }
 
-// A caller built against an older header knows fewer members: those it does not know are "not given".
+// A caller built against an older header knows fewer members: those it does not know are "not
+// given".
 smoothpost_options complete(const smoothpost_options& given) {
   smoothpost_options options;
   smoothpost_options_init(&options, sizeof options);

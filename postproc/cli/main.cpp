@@ -140,7 +140,9 @@ int finish(const CommandLine& line, const smoothpost_result* result) {
   if (line.output == "-") std::cout.write(program, static_cast<std::streamsize>(size));
   std::cout.flush();
   if (!std::cout) {
-    std::cerr << "error: standard output cannot be written [" << "US132" << "]\n";
+    std::cerr << "error: standard output cannot be written ["
+              << "US132"
+              << "]\n";
     return SMOOTHPOST_USAGE;
   }
   const std::string summary = smoothpost_result_summary(result);
@@ -166,7 +168,9 @@ int main(int argc, char** argv) {
   const int status = smoothpost_run(&options.c, &raw);
   if (view.bar == Bar::terminal && view.last >= 0) std::fprintf(stderr, "\r%*s\r", 24, "");
   if (!raw) {
-    std::cerr << "error: internal error: out of memory [" << "IN102" << "]\n";
+    std::cerr << "error: internal error: out of memory ["
+              << "IN102"
+              << "]\n";
     return status;
   }
   const std::unique_ptr<smoothpost_result, void (*)(smoothpost_result*)> result(

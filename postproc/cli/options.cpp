@@ -47,12 +47,15 @@ void add_input_options(CLI::App* app, CommandLine& l) {
   app->add_option("--input-dialect", l.input_dialect, "linuxcnc");
   app->add_option("--input-machine", l.input_machine,
                   "the machine that the input was posted for; needed for rotary words");
-  app->add_option("--process", l.process, "TOML with [process.events] in place of the input machine's");
+  app->add_option("--process", l.process,
+                  "TOML with [process.events] in place of the input machine's");
   app->add_option("--input-work-offset", l.input_work_offset,
                   "G54=x,y,z[,a,b,c]: the program's zero on the input machine")
       ->take_all()
       ->allow_extra_args(false);
-  app->add_option("--tool", l.tool, "N=length in mm, repeatable")->take_all()->allow_extra_args(false);
+  app->add_option("--tool", l.tool, "N=length in mm, repeatable")
+      ->take_all()
+      ->allow_extra_args(false);
   app->add_option("--tip-tolerance", l.tip_tolerance, "mm");
   app->add_option("--axis-tolerance", l.axis_tolerance, "deg");
 }
@@ -74,7 +77,8 @@ void add_convert(CLI::App& app, CommandLine& l) {
   c->add_option("--schedule", l.schedule, "programmed");
   c->add_option("--links", l.links, "keep");
   c->add_option("--cuts", l.cuts, "a later version");
-  c->add_option("--trajectory", l.trajectory, "write joint samples at the machine's cycle to FILE.csv");
+  c->add_option("--trajectory", l.trajectory,
+                "write joint samples at the machine's cycle to FILE.csv");
   c->add_option("--line-map", l.line_map, "write output line -> input line to FILE.json");
   c->add_flag("--no-collision-check", l.no_collision_check, "this version makes none");
   c->add_flag("--force", l.force, "write a refused program too, marked NOT CERTIFIED");
@@ -86,7 +90,8 @@ void add_check(CLI::App& app, CommandLine& l) {
   c->add_option("program", l.input, "the program; - for standard input")->required();
   add_machine_options(c, l);
   add_part_options(c, l);
-  c->add_option("--against", l.against, "the CAM program that it is to follow: certifies its shape too");
+  c->add_option("--against", l.against,
+                "the CAM program that it is to follow: certifies its shape too");
   add_input_options(c, l);
   add_output_options(c, l);
 }

@@ -11,9 +11,10 @@ namespace smoothpost::cli {
 struct CommandLine {
   std::string command;
   std::vector<std::string> arguments;
-  std::string input, machine, machine_path, workpiece, workpiece_unit, output, dialect, input_format,
-      input_dialect, input_machine, process, tip_tolerance, axis_tolerance, lead, tilt, smoothing,
-      orientation, optimise, schedule, links, cuts, against, json, report, trajectory, line_map;
+  std::string input, machine, machine_path, workpiece, workpiece_unit, output, dialect,
+      input_format, input_dialect, input_machine, process, tip_tolerance, axis_tolerance, lead,
+      tilt, smoothing, orientation, optimise, schedule, links, cuts, against, json, report,
+      trajectory, line_map;
   std::vector<std::string> work_offset, input_work_offset, tool, set;
   bool no_collision_check = false;
   bool timings = false;

@@ -14,7 +14,8 @@ namespace smoothpost {
 
 namespace {
 
-Diagnostic system_error(const char* code, const std::string& path, const std::string& what, int error) {
+Diagnostic system_error(const char* code, const std::string& path, const std::string& what,
+                        int error) {
   Diagnostic d;
   d.code = code;
   d.text = what + ": " + std::strerror(error);
@@ -62,7 +63,8 @@ Result<std::string> read_file(const std::string& path, std::size_t limit) {
   while (true) {
     const ssize_t n = ::read(fd.get(), buffer.data(), buffer.size());
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0) return Result<std::string>::failure(system_error("US130", path, "cannot be read", errno));
+    if (n < 0)
+      return Result<std::string>::failure(system_error("US130", path, "cannot be read", errno));
     if (n == 0) return bytes;
     bytes.append(buffer.data(), static_cast<std::size_t>(n));
     if (bytes.size() > limit)
@@ -91,7 +93,8 @@ Diagnostics write_file(const std::string& path, std::string_view bytes) {
   std::string temporary;
   int raw = -1;
   for (int attempt = 0; attempt < 100 && raw < 0; ++attempt) {
-    temporary = target.string() + ".new" + std::to_string(::getpid()) + "-" + std::to_string(attempt);
+    temporary =
+        target.string() + ".new" + std::to_string(::getpid()) + "-" + std::to_string(attempt);
     raw = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (raw < 0 && errno != EEXIST) break;
   }

@@ -7,12 +7,13 @@
 
 namespace smoothpost {
 
-/// The bytes of a file. Fails with US130 (reason of the system) for what cannot be read, and for files of
-/// more than `limit` bytes.
+/// The bytes of a file. Fails with US130 (reason of the system) for what cannot be read, and for
+/// files of more than `limit` bytes.
 Result<std::string> read_file(const std::string& path, std::size_t limit = std::size_t{2} << 30);
 
-/// Writes a file so that at any moment `path` holds either its old content or all of the new: a temporary
-/// beside it, flushed to the disk, renamed. A symbolic link is followed. Fails with US131.
+/// Writes a file so that at any moment `path` holds either its old content or all of the new: a
+/// temporary beside it, flushed to the disk, renamed. A symbolic link is followed. Fails with
+/// US131.
 Diagnostics write_file(const std::string& path, std::string_view bytes);
 
 }  // namespace smoothpost

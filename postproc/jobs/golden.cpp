@@ -60,11 +60,14 @@ Result<Case> read_case(const fs::path& folder) {
       c.exact = entry.value.string == "exact";
     } else if (entry.key == "options" && entry.value.kind == TomlKind::table) {
       auto options = options_from_toml(entry.value.table);
-      if (options.ok()) c.options = std::move(options.value());
-      else errors.insert(errors.end(), options.diagnostics().begin(), options.diagnostics().end());
+      if (options.ok())
+        c.options = std::move(options.value());
+      else
+        errors.insert(errors.end(), options.diagnostics().begin(), options.diagnostics().end());
     } else {
-      Diagnostic d = usage_error("US150", "key \"" + entry.key +
-                                              "\": a case has why, mode = \"exact\" | \"measured\" and [options]");
+      Diagnostic d = usage_error(
+          "US150", "key \"" + entry.key +
+                       "\": a case has why, mode = \"exact\" | \"measured\" and [options]");
       d.where = entry.where;
       errors.push_back(std::move(d));
     }
@@ -157,8 +160,10 @@ std::string text_difference(const std::string& expected, const std::string& actu
   std::string text;
   std::size_t shown = 0, left = 0;
   const auto show = [&](char sign, std::size_t number, const std::string& line) {
-    if (shown++ < max_lines) text += "    " + std::string(1, sign) + std::to_string(number) + ": " + line + "\n";
-    else ++left;
+    if (shown++ < max_lines)
+      text += "    " + std::string(1, sign) + std::to_string(number) + ": " + line + "\n";
+    else
+      ++left;
   };
   for (std::size_t i = head; i + tail < std::max(a.size(), b.size()); ++i) {
     const bool in_a = i + tail < a.size(), in_b = i + tail < b.size();
@@ -189,14 +194,16 @@ JobResult run_golden_command(const Options& options, const Progress& progress) {
   }
   std::sort(folders.begin(), folders.end());
   if (folders.empty()) {
-    result.diagnostics.push_back(usage_error("US151", words[1] + ": no case.toml in it or in its folders"));
+    result.diagnostics.push_back(
+        usage_error("US151", words[1] + ": no case.toml in it or in its folders"));
     result.status = ExitStatus::usage;
     return result;
   }
   std::size_t failed = 0;
   for (const auto& folder : folders) {
     auto c = read_case(folder);
-    result.diagnostics.insert(result.diagnostics.end(), c.diagnostics().begin(), c.diagnostics().end());
+    result.diagnostics.insert(result.diagnostics.end(), c.diagnostics().begin(),
+                              c.diagnostics().end());
     if (!c.ok()) {
       ++failed;
       continue;
@@ -209,7 +216,8 @@ JobResult run_golden_command(const Options& options, const Progress& progress) {
       continue;
     }
     const std::string difference = compare(c.value(), now);
-    result.text += (difference.empty() ? "ok     " : "FAILED ") + c.value().name + "\n" + difference;
+    result.text +=
+        (difference.empty() ? "ok     " : "FAILED ") + c.value().name + "\n" + difference;
     if (!difference.empty()) ++failed;
   }
   result.text += std::to_string(folders.size() - failed) + " of " + std::to_string(folders.size()) +

@@ -71,7 +71,8 @@ class Run {
     if (!options_.against.empty() && !read_against(in)) return finish();
     in.file_name = input_name_;
     in.machine = machine_.definition;
-    context_.input_lines = static_cast<std::size_t>(std::count(in.text.begin(), in.text.end(), '\n'));
+    context_.input_lines =
+        static_cast<std::size_t>(std::count(in.text.begin(), in.text.end(), '\n'));
     context_.program_sha256 = context_.input_sha256;
     report(check_program(in, progress_));
     return finish();
@@ -92,8 +93,9 @@ class Run {
     refuse(options_.report, "--report");
     refuse(options_.cuts, "--cuts");
     if (options_.links == "plan" || (!options_.links.empty() && options_.links != "keep"))
-      add(usage_error("US122", "--links " + options_.links + " is not possible in this version: links are kept "
-                               "as programmed (--links keep)"));
+      add(usage_error("US122", "--links " + options_.links +
+                                   " is not possible in this version: links are kept "
+                                   "as programmed (--links keep)"));
     if (!options_.input_dialect.empty() && options_.input_dialect != "linuxcnc")
       add(usage_error("US122", "--input-dialect " + options_.input_dialect +
                                    " is not read in this version; possible: linuxcnc"));
@@ -102,7 +104,8 @@ class Run {
 
   bool load_output_machine() {
     if (options_.machine.empty()) {
-      add(usage_error("US101", "no machine: say -m MACHINE (`smoothpost machines list` shows them)"));
+      add(usage_error("US101",
+                      "no machine: say -m MACHINE (`smoothpost machines list` shows them)"));
       return false;
     }
     const auto overrides = overrides_of(options_);
@@ -140,7 +143,8 @@ class Run {
     if (!options_.output.empty() && options_.output != "-" && !options_.input_data) {
       std::error_code error;
       if (fs::equivalent(options_.output, options_.input, error)) {
-        add(usage_error("US105", "-o " + options_.output + " is the input file: name another output"));
+        add(usage_error("US105",
+                        "-o " + options_.output + " is the input file: name another output"));
         return false;
       }
     }
@@ -232,7 +236,8 @@ class Run {
   // Where the program's zero lies on the output machine. `system`: the one that the program uses.
   std::optional<Pose> read_placement(std::optional<int> system) {
     if (options_.work_offset.size() == 1 && options_.work_offset.front() == "auto") {
-      add(usage_error("US122", "--work-offset auto is not possible in this version: give G54=x,y,z"));
+      add(usage_error("US122",
+                      "--work-offset auto is not possible in this version: give G54=x,y,z"));
       return {};
     }
     const auto offsets = read_offsets(options_.work_offset, "--work-offset");
@@ -240,13 +245,15 @@ class Run {
     if (!offsets.ok()) return {};
     Pose placement = Pose::Identity();
     if (offsets.value().empty()) {
-      placement_text_ = "the program's zero lies at the zero of the machine's workpiece frame (no --work-offset)";
+      placement_text_ =
+          "the program's zero lies at the zero of the machine's workpiece frame (no --work-offset)";
       return placement;
     }
     if (offsets.value().size() > 1 || (system && offsets.value().front().system != *system)) {
-      add(usage_error("US144", "--work-offset places the program's zero, which is that of " +
-                                   system_name(system.value_or(1)) +
-                                   " here: give exactly that one (others follow by --input-work-offset)"));
+      add(usage_error("US144",
+                      "--work-offset places the program's zero, which is that of " +
+                          system_name(system.value_or(1)) +
+                          " here: give exactly that one (others follow by --input-work-offset)"));
       return {};
     }
     const OffsetOption& o = offsets.value().front();
@@ -264,7 +271,8 @@ class Run {
 
   bool place(ConvertInput& in) {
     const bool words = context_.input_format == "nc";
-    const auto placement = read_placement(words ? std::optional<int>(in.input.system) : std::nullopt);
+    const auto placement =
+        read_placement(words ? std::optional<int>(in.input.system) : std::nullopt);
     if (!placement) return false;
     in.placement = *placement;
     in.placement_text = placement_text_;
@@ -290,7 +298,8 @@ class Run {
     if (options_.workpiece_unit == "inch") {
       settings.scale = kMillimetresPerInch;
     } else if (!options_.workpiece_unit.empty() && options_.workpiece_unit != "mm") {
-      add(usage_error("US145", "--workpiece-unit " + options_.workpiece_unit + ": expected is mm or inch"));
+      add(usage_error("US145",
+                      "--workpiece-unit " + options_.workpiece_unit + ": expected is mm or inch"));
       return false;
     }
     const auto stl = read_stl(bytes, part_name, settings);
@@ -309,7 +318,8 @@ class Run {
 
   std::vector<std::string> title(const ConvertInput& in) const {
     std::vector<std::string> lines;
-    lines.push_back(std::string("smoothpost ") + kVersion + " for machine " + machine_.definition.name);
+    lines.push_back(std::string("smoothpost ") + kVersion + " for machine " +
+                    machine_.definition.name);
     lines.push_back("input " + base_name(input_name_) + " sha256 " + context_.input_sha256);
     lines.push_back("machine joints. " + in.placement_text);
     std::map<int, double> tools;
@@ -341,9 +351,9 @@ class Run {
       if (c.name == "tip_deviation") tip = &c;
       if (c.name == "axis_deviation") axis = &c;
     }
-    std::string text = result_.verdict + " (level " + conversion.level + "): " +
-                       std::to_string(conversion.checks.size()) + " checks, " + std::to_string(failed) +
-                       " failed";
+    std::string text = result_.verdict + " (level " + conversion.level +
+                       "): " + std::to_string(conversion.checks.size()) + " checks, " +
+                       std::to_string(failed) + " failed";
     if (tip && axis)
       text += "; tip " + decimal(tip->value, 5) + " of " + decimal(tip->limit, 5) + " mm, axis " +
               decimal(axis->value, 5) + " of " + decimal(axis->limit, 5) + " deg";
@@ -392,7 +402,8 @@ class Run {
 
   // The input's stem in the working directory with the dialect's extension, never the input itself.
   std::string default_output() const {
-    const fs::path stem = options_.input == "-" ? fs::path("stdin") : fs::path(options_.input).stem();
+    const fs::path stem =
+        options_.input == "-" ? fs::path("stdin") : fs::path(options_.input).stem();
     const std::string extension = "." + machine_.definition.dialect.extension;
     const fs::path wanted = stem.string() + extension;
     std::error_code error;
@@ -422,7 +433,8 @@ JobResult dispatch(const Options& options, const Progress& progress) {
   JobResult result;
   result.status = ExitStatus::usage;
   result.diagnostics.push_back(usage_error(
-      "US100", "unknown command \"" + options.command + "\": convert, check, machines, formats or golden"));
+      "US100",
+      "unknown command \"" + options.command + "\": convert, check, machines, formats or golden"));
   return result;
 }
 
@@ -433,10 +445,14 @@ ExitStatus status_of(const Diagnostics& diagnostics) {
   for (const auto& d : diagnostics) {
     if (d.severity != Severity::error) continue;
     const std::string family = d.code.substr(0, d.code.find_first_of("0123456789"));
-    if (family == "IN") internal = true;
-    else if (family == "US") usage = true;
-    else if (family == "NC" || family == "CSV" || family == "STL" || family == "MF") unreadable = true;
-    else refused = true;
+    if (family == "IN")
+      internal = true;
+    else if (family == "US")
+      usage = true;
+    else if (family == "NC" || family == "CSV" || family == "STL" || family == "MF")
+      unreadable = true;
+    else
+      refused = true;
   }
   if (internal) return ExitStatus::internal;
   if (usage) return ExitStatus::usage;

@@ -11,7 +11,8 @@ namespace smoothpost {
 /// Exit statuses of the tool, fixed: docs/diagnostics.md.
 enum class ExitStatus { certified = 0, internal = 1, usage = 2, refused = 3, unreadable = 4 };
 
-/// What a run made. Files named in the options are written already; `program` and `report` are also here.
+/// What a run made. Files named in the options are written already; `program` and `report` are also
+/// here.
 struct JobResult {
   ExitStatus status = ExitStatus::internal;
   std::string verdict;
@@ -27,8 +28,8 @@ struct JobResult {
 
 inline constexpr const char* kVersion = "0.1.0";
 
-/// Runs one command. Never throws for the user's faults; writes files atomically, reports also on refusal,
-/// the program only when it is certified or forced.
+/// Runs one command. Never throws for the user's faults; writes files atomically, reports also on
+/// refusal, the program only when it is certified or forced.
 JobResult run_job(const Options& options, const Progress& progress);
 
 /// The status that the errors among `diagnostics` call for; certified when there is none.

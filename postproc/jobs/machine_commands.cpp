@@ -71,7 +71,8 @@ JobResult list(const Options& options) {
   for (const auto& [name, file] : found) {
     const auto machine = load_machine(file, options, {});
     result.text += name + ": " +
-                   (machine.ok() ? machine.value().definition.description : "not valid, see `smoothpost machines validate " + file + "`") +
+                   (machine.ok() ? machine.value().definition.description
+                                 : "not valid, see `smoothpost machines validate " + file + "`") +
                    "\n";
   }
   result.status = ExitStatus::certified;
@@ -107,8 +108,8 @@ JobResult run_machines_command(const Options& options) {
     result.status = ExitStatus::usage;
     return result;
   }
-  result.text = machine.value().path + ": valid, machine " + machine.value().definition.name + " with " +
-                std::to_string(machine.value().definition.size()) + " axes\n";
+  result.text = machine.value().path + ": valid, machine " + machine.value().definition.name +
+                " with " + std::to_string(machine.value().definition.size()) + " axes\n";
   return result;
 }
 
@@ -116,7 +117,8 @@ JobResult run_formats_command(const Options&) {
   JobResult result;
   result.text = "input formats (--input-format):\n";
   for (const auto& f : input_formats())
-    result.text += "  " + std::string(f.name) + ": " + f.description + "; extensions: " + f.extensions + "\n";
+    result.text +=
+        "  " + std::string(f.name) + ": " + f.description + "; extensions: " + f.extensions + "\n";
   result.text += "output dialects (--dialect):\n";
   for (const auto& d : dialects())
     result.text += "  " + std::string(d.name) + ": " + d.description + "\n";

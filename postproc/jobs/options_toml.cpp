@@ -75,20 +75,26 @@ Result<Options> options_from_toml(const TomlTable& table) {
     std::replace(key.begin(), key.end(), '-', '_');
     const auto& value = entry.value;
     if (const auto text = text_options().find(key); text != text_options().end()) {
-      if (value.kind == TomlKind::string) options.*(text->second) = value.string;
-      else errors.push_back(wrong(entry, "a string is expected"));
+      if (value.kind == TomlKind::string)
+        options.*(text->second) = value.string;
+      else
+        errors.push_back(wrong(entry, "a string is expected"));
     } else if (const auto list = list_options().find(key); list != list_options().end()) {
       const bool strings =
           value.kind == TomlKind::array &&
           std::all_of(value.items.begin(), value.items.end(),
                       [](const TomlValue& item) { return item.kind == TomlKind::string; });
-      if (value.kind == TomlKind::string) (options.*(list->second)).push_back(value.string);
+      if (value.kind == TomlKind::string)
+        (options.*(list->second)).push_back(value.string);
       else if (strings)
         for (const auto& item : value.items) (options.*(list->second)).push_back(item.string);
-      else errors.push_back(wrong(entry, "a string or an array of strings is expected"));
+      else
+        errors.push_back(wrong(entry, "a string or an array of strings is expected"));
     } else if (const auto flag = switch_options().find(key); flag != switch_options().end()) {
-      if (value.kind == TomlKind::boolean) options.*(flag->second) = value.boolean;
-      else errors.push_back(wrong(entry, "true or false is expected"));
+      if (value.kind == TomlKind::boolean)
+        options.*(flag->second) = value.boolean;
+      else
+        errors.push_back(wrong(entry, "true or false is expected"));
     } else {
       errors.push_back(wrong(entry, "there is no such option"));
     }

@@ -65,8 +65,8 @@ std::vector<std::string> machine_folders(const Options& options) {
   const fs::path own = own_folder();
   if (!own.empty()) {
     // <prefix>/lib[/arch], <prefix>/bin -> <prefix>/share; build/<preset>/lib -> the source tree.
-    for (const char* way : {"../share/smoothpost/machines", "../../share/smoothpost/machines",
-                            "../../../machines"}) {
+    for (const char* way :
+         {"../share/smoothpost/machines", "../../share/smoothpost/machines", "../../../machines"}) {
       std::error_code error;
       const fs::path folder = fs::canonical(own / way, error);
       if (!error && fs::is_directory(folder, error)) folders.push_back(folder.string());
@@ -92,7 +92,8 @@ Result<LoadedMachine> load_machine(const std::string& name_or_file, const Option
   }
   if (path.empty()) {
     std::string where;
-    for (const auto& folder : machine_folders(options)) where += (where.empty() ? "" : ", ") + folder;
+    for (const auto& folder : machine_folders(options))
+      where += (where.empty() ? "" : ", ") + folder;
     return Result<LoadedMachine>::failure(
         usage_error("US140", "no machine named \"" + name_or_file + "\" in " +
                                  (where.empty() ? "any folder" : where) +
@@ -134,7 +135,7 @@ Result<std::vector<MachineOverride>> overrides_of(const Options& options) {
 
 Result<std::vector<OffsetOption>> read_offsets(const std::vector<std::string>& texts,
                                                const std::string& option) {
-  static const std::vector<std::string> kSystems = {"G54", "G55", "G56", "G57", "G58",
+  static const std::vector<std::string> kSystems = {"G54", "G55",   "G56",   "G57",  "G58",
                                                     "G59", "G59.1", "G59.2", "G59.3"};
   std::vector<OffsetOption> offsets;
   Diagnostics errors;
@@ -146,13 +147,16 @@ Result<std::vector<OffsetOption>> read_offsets(const std::vector<std::string>& t
     if (good)
       for (const auto& part : split(std::string_view(text).substr(at + 1), ',')) {
         const auto value = read_number(part);
-        if (value) numbers.push_back(*value);
-        else good = false;
+        if (value)
+          numbers.push_back(*value);
+        else
+          good = false;
       }
     if (!good || (numbers.size() != 3 && numbers.size() != 6)) {
-      errors.push_back(usage_error("US142", option + " " + text +
-                                                ": expected is G54=x,y,z or G54=x,y,z,a,b,c (G54 to "
-                                                "G59.3, mm and degrees)"));
+      errors.push_back(
+          usage_error("US142", option + " " + text +
+                                   ": expected is G54=x,y,z or G54=x,y,z,a,b,c (G54 to "
+                                   "G59.3, mm and degrees)"));
       continue;
     }
     OffsetOption offset;
@@ -175,9 +179,10 @@ Result<std::map<int, double>> read_tools(const std::vector<std::string>& texts) 
     const auto length = at == std::string::npos ? std::nullopt : read_number(text.substr(at + 1));
     if (!number || !length || *number < 1 || *number != std::floor(*number) || *number > 99999 ||
         *length < 0.0 || *length > 10000.0)
-      errors.push_back(usage_error("US143", "--tool " + text +
-                                                ": expected is N=length, a tool number and its length in "
-                                                "mm (0 to 10000)"));
+      errors.push_back(
+          usage_error("US143", "--tool " + text +
+                                   ": expected is N=length, a tool number and its length in "
+                                   "mm (0 to 10000)"));
     else
       tools[static_cast<int>(*number)] = *length;
   }

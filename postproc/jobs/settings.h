@@ -30,7 +30,8 @@ Result<LoadedMachine> load_machine(const std::string& name_or_file, const Option
 /// --set and the options that are short for it (--tip-tolerance, --smoothing ...), as overrides.
 Result<std::vector<MachineOverride>> overrides_of(const Options& options);
 
-/// "G54=1,2,3[,a,b,c]" for every entry; mm and degrees, `a b c` turn about X, Y, Z in the order Rz·Ry·Rx.
+/// "G54=1,2,3[,a,b,c]" for every entry; mm and degrees, `a b c` turn about X, Y, Z in the order
+/// Rz·Ry·Rx.
 struct OffsetOption {
   int system = 1;
   Vec3 position = Vec3::Zero();

@@ -30,7 +30,9 @@ class Stopwatch {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-void append(Diagnostics& to, const Diagnostics& from) { to.insert(to.end(), from.begin(), from.end()); }
+void append(Diagnostics& to, const Diagnostics& from) {
+  to.insert(to.end(), from.begin(), from.end());
+}
 
 Diagnostic diagnostic(const char* code, std::string text, std::string file = {}, int line = 0) {
   Diagnostic d;
@@ -53,7 +55,8 @@ RegistrationSettings registration_settings(const MachineDefinition& machine) {
   return s;
 }
 
-Check registration_check(const PartRegistration& registration, const RegistrationSettings& settings) {
+Check registration_check(const PartRegistration& registration,
+                         const RegistrationSettings& settings) {
   Check c;
   c.name = "part_registration";
   c.value = registration.gap.worst_deviation;
@@ -64,8 +67,8 @@ Check registration_check(const PartRegistration& registration, const Registratio
   return c;
 }
 
-/// Where the input's path meets the part: before anything is planned, so that an inch file or a wrong zero
-/// is named as what it is.
+/// Where the input's path meets the part: before anything is planned, so that an inch file or a
+/// wrong zero is named as what it is.
 class PartCheck {
  public:
   PartCheck(const TriangleMesh& part, const MachineDefinition& machine)
@@ -85,7 +88,8 @@ class PartCheck {
     std::vector<std::uint32_t> lines;
     for (std::size_t k = 1; k <= reference.segments(); ++k) {
       if (!reference.path().points[k].beam) continue;
-      const int steps = static_cast<int>(std::clamp(std::ceil(reference.length(k) / kStep), 1.0, 64.0));
+      const int steps =
+          static_cast<int>(std::clamp(std::ceil(reference.length(k) / kStep), 1.0, 64.0));
       for (int i = 1; i <= steps; ++i)
         points.push_back(reference.at(k, static_cast<double>(i) / steps));
       lines.resize(points.size(), reference.path().points[k].line);
@@ -127,7 +131,8 @@ class PartCheck {
 };
 
 /// Fills what does not depend on how the program was made.
-void describe_input(const InterpretedInput& input, const ReferencePath& reference, Conversion& out) {
+void describe_input(const InterpretedInput& input, const ReferencePath& reference,
+                    Conversion& out) {
   bool in_cut = false;
   bool in_link = false;
   for (std::size_t k = 1; k < input.path.points.size(); ++k) {
@@ -147,12 +152,14 @@ void describe_input(const InterpretedInput& input, const ReferencePath& referenc
 void describe_promises(const MachineDefinition& machine, bool has_part, Conversion& out) {
   const double tip = machine.tolerance.tip;
   const ToleranceBudget& share = machine.tolerance.budget;
-  out.budget_mm = {share.merge * tip, share.smoothing * tip, share.chord * tip, share.rounding * tip,
-                   share.controller * tip};
-  out.assumes.push_back("the machine is as its definition file says: axes, pivots and tool are calibrated");
+  out.budget_mm = {share.merge * tip, share.smoothing * tip, share.chord * tip,
+                   share.rounding * tip, share.controller * tip};
+  out.assumes.push_back(
+      "the machine is as its definition file says: axes, pivots and tool are calibrated");
   if (machine.dialect.offset_guard)
-    out.assumes.push_back("every work, G92 and tool offset of the controller is zero: the program aborts "
-                          "before its first motion otherwise");
+    out.assumes.push_back(
+        "every work, G92 and tool offset of the controller is zero: the program aborts "
+        "before its first motion otherwise");
   out.not_checked.push_back("clearance");
   out.not_checked.push_back("acceleration_limit");
   out.not_checked.push_back("jerk_limit");
@@ -163,7 +170,9 @@ void describe_promises(const MachineDefinition& machine, bool has_part, Conversi
   std::string assumed;
   for (const auto& axis : machine.axes)
     if (axis.source == LimitSource::assumed) assumed += (assumed.empty() ? "" : ", ") + axis.name;
-  if (!assumed.empty()) out.assumes.push_back("the limits of these axes are assumed, not from a datasheet, and used at 90 %: " + assumed);
+  if (!assumed.empty())
+    out.assumes.push_back(
+        "the limits of these axes are assumed, not from a datasheet, and used at 90 %: " + assumed);
 }
 
 }  // namespace
@@ -192,7 +201,10 @@ namespace {
 class Converter {
  public:
   Converter(const ConvertInput& in, bool force, const Progress& progress)
-      : in_(in), force_(force), progress_(progress), watch_(out_.stages),
+      : in_(in),
+        force_(force),
+        progress_(progress),
+        watch_(out_.stages),
         reference_(in.input.path, in.input.frames) {}
 
   Conversion run() {
@@ -218,9 +230,11 @@ class Converter {
   // Settings that name what this version does not do are refused, never ignored.
   bool recipe_is_possible() {
     const auto& r = in_.machine.recipe;
-    const auto refuse = [this](const std::string& key, const std::string& value, const char* possible) {
+    const auto refuse = [this](const std::string& key, const std::string& value,
+                               const char* possible) {
       out_.diagnostics.push_back(diagnostic(
-          "US120", key + " = \"" + value + "\" is not possible in this version; possible: " + possible));
+          "US120",
+          key + " = \"" + value + "\" is not possible in this version; possible: " + possible));
     };
     if (r.smoothing != "none") refuse("recipe.smoothing", r.smoothing, "none");
     if (r.orientation != "programmed") refuse("recipe.orientation", r.orientation, "programmed");
@@ -228,7 +242,8 @@ class Converter {
     if (r.schedule != "programmed") refuse("recipe.schedule", r.schedule, "programmed");
     if (in_.machine.tolerance.lead != 0.0 || in_.machine.tolerance.tilt != 0.0)
       refuse("tolerance.lead_deg and tilt_deg", "free", "0 (the programmed tool axis is kept)");
-    if (in_.machine.dialect.mode != "joint") refuse("dialect.mode", in_.machine.dialect.mode, "joint");
+    if (in_.machine.dialect.mode != "joint")
+      refuse("dialect.mode", in_.machine.dialect.mode, "joint");
     if (in_.machine.dialect.path_mode != "exact")
       refuse("dialect.path_mode", in_.machine.dialect.path_mode, "exact");
     return !has_error(out_.diagnostics);
@@ -242,9 +257,9 @@ class Converter {
     Check c = registration_check(registration, part_->settings());
     c.input_line = worst_line;
     if (!c.ok)
-      out_.diagnostics.push_back(
-          diagnostic(registration_code(registration.verdict).c_str(),
-                     c.note + "; worst at input line " + std::to_string(worst_line), in_.part_name));
+      out_.diagnostics.push_back(diagnostic(
+          registration_code(registration.verdict).c_str(),
+          c.note + "; worst at input line " + std::to_string(worst_line), in_.part_name));
     out_.checks.push_back(c);
     watch_.lap("registration");
     return c.ok || force_;
@@ -255,9 +270,10 @@ class Converter {
     const auto pair = RotaryPair::from(chain_);
     if (!pair) {
       out_.diagnostics.push_back(diagnostic(
-          "KN110", "machine " + in_.machine.name +
-                       " has no closed form in this version: two free rotary and three free linear axes "
-                       "are needed, further axes redundant = true"));
+          "KN110",
+          "machine " + in_.machine.name +
+              " has no closed form in this version: two free rotary and three free linear axes "
+              "are needed, further axes redundant = true"));
       return false;
     }
     const auto& tolerance = in_.machine.tolerance;
@@ -309,8 +325,8 @@ class Converter {
     }
     out_.read = std::move(read.value());
     Verification machine = verify_machine(out_.read, in_.machine);
-    const Checks deviation =
-        verify_deviation(out_.read, in_.machine, {reference_, out_.line_map, program_, chain_}, progress_);
+    const Checks deviation = verify_deviation(
+        out_.read, in_.machine, {reference_, out_.line_map, program_, chain_}, progress_);
     out_.checks.insert(out_.checks.end(), deviation.begin(), deviation.end());
     if (part_ && part_->ok()) out_.checks.push_back(part_->output(out_.read, chain_));
     out_.checks.insert(out_.checks.end(), machine.checks.begin(), machine.checks.end());
@@ -336,8 +352,8 @@ class Converter {
       if (c.ok) continue;
       if (c.name.rfind("beam_", 0) == 0) beam_rules_ok = false;
       if (c.name == "part_registration") continue;  // told by its own name already
-      out_.diagnostics.push_back(diagnostic(
-          "CK101", describe(c), in_.input_name, static_cast<int>(c.input_line)));
+      out_.diagnostics.push_back(
+          diagnostic("CK101", describe(c), in_.input_name, static_cast<int>(c.input_line)));
     }
     if (made && out_.checks_ok() && !has_error(out_.diagnostics)) {
       out_.verdict = Verdict::certified;
@@ -358,8 +374,8 @@ class Converter {
   }
 
   static std::string describe(const Check& c) {
-    std::string text = "check " + c.name + " failed: " + number(c.value) + " " + c.unit + ", limit " +
-                       number(c.limit) + " " + c.unit;
+    std::string text = "check " + c.name + " failed: " + number(c.value) + " " + c.unit +
+                       ", limit " + number(c.limit) + " " + c.unit;
     if (c.output_line > 0) text += ", output line " + std::to_string(c.output_line);
     if (!c.note.empty()) text += ". " + c.note;
     return text;
@@ -394,13 +410,14 @@ Conversion convert(const ConvertInput& in, bool force, const Progress& progress)
 
 namespace {
 
-/// The shape of a program against its input, as checks. The matching bounds the larger of the two shares of
-/// the tolerances, so both deviations are told as that share of theirs.
+/// The shape of a program against its input, as checks. The matching bounds the larger of the two
+/// shares of the tolerances, so both deviations are told as that share of theirs.
 Checks shape_checks(const CheckInput& in, const ReadBack& read, const ScrewChain& chain,
                     const Progress& progress) {
   const ReferencePath reference(in.against->path, in.against->frames);
   const auto& tolerance = in.machine.tolerance;
-  const PathMatch match = match_paths(read, chain, reference, {tolerance.tip, tolerance.axis}, progress);
+  const PathMatch match =
+      match_paths(read, chain, reference, {tolerance.tip, tolerance.axis}, progress);
   const auto check = [&](const char* name, double limit, const char* unit) {
     Check c;
     c.name = name;
@@ -422,8 +439,9 @@ void tell_failed_checks(Conversion& out, const std::string& file) {
     if (!c.ok)
       out.diagnostics.push_back(diagnostic(
           "CK101",
-          "check " + c.name + " failed: " + (std::isfinite(c.value) ? std::to_string(c.value) : "no bound") +
-              " " + c.unit + ", limit " + std::to_string(c.limit) + " " + c.unit +
+          "check " + c.name +
+              " failed: " + (std::isfinite(c.value) ? std::to_string(c.value) : "no bound") + " " +
+              c.unit + ", limit " + std::to_string(c.limit) + " " + c.unit +
               (c.input_line > 0 ? ", input line " + std::to_string(c.input_line) : "") +
               (c.note.empty() ? "" : ". " + c.note),
           file, static_cast<int>(c.output_line)));
@@ -441,8 +459,8 @@ Conversion check_program(const CheckInput& in, const Progress& progress) {
   }
   const Dialect* dialect = find_dialect(in.machine.dialect.name);
   if (!dialect) {
-    out.diagnostics.push_back(diagnostic("US121", "no output dialect \"" + in.machine.dialect.name +
-                                                      "\" in this version"));
+    out.diagnostics.push_back(diagnostic(
+        "US121", "no output dialect \"" + in.machine.dialect.name + "\" in this version"));
     return out;
   }
   out.interpolation = dialect->interpolation;
@@ -470,8 +488,10 @@ Conversion check_program(const CheckInput& in, const Progress& progress) {
   }
   watch.lap("verify");
   tell_failed_checks(out, in.file_name);
-  if (has_error(out.diagnostics)) out.verdict = Verdict::refused;
-  else out.verdict = in.against ? Verdict::certified : Verdict::limits_only;
+  if (has_error(out.diagnostics))
+    out.verdict = Verdict::refused;
+  else
+    out.verdict = in.against ? Verdict::certified : Verdict::limits_only;
   return out;
 }
 

@@ -16,12 +16,13 @@ namespace smoothpost {
 struct ConvertInput {
   InterpretedInput input;
   MachineDefinition machine;
-  Pose placement = Pose::Identity();  ///< X_WM'W: the program's zero in the machine's workpiece frame
-  std::string placement_text;         ///< for the certificate
-  std::optional<TriangleMesh> part;   ///< in the program's coordinates
+  Pose placement =
+      Pose::Identity();        ///< X_WM'W: the program's zero in the machine's workpiece frame
+  std::string placement_text;  ///< for the certificate
+  std::optional<TriangleMesh> part;  ///< in the program's coordinates
   std::string part_name;
   std::string input_name;
-  std::vector<std::string> title;     ///< comment lines at the top of the program
+  std::vector<std::string> title;  ///< comment lines at the top of the program
 };
 
 enum class Verdict { certified, limits_only, refused, forced };
@@ -59,8 +60,8 @@ struct Conversion {
 };
 
 /// read -> registration -> kinematics -> emission -> read back -> certificate.
-/// The program is made when it can be made, also when a check fails (the verdict says so); the caller
-/// writes it only when it is certified or forced.
+/// The program is made when it can be made, also when a check fails (the verdict says so); the
+/// caller writes it only when it is certified or forced.
 Conversion convert(const ConvertInput& in, bool force, const Progress& progress);
 
 struct CheckInput {
@@ -73,8 +74,8 @@ struct CheckInput {
   std::optional<InterpretedInput> against;  ///< the input that the program is to follow
 };
 
-/// Certifies an existing machine program against its machine: verdict limits_only; with `against` also its
-/// shape, by a monotone matching (path_match.h): verdict certified. Else refused.
+/// Certifies an existing machine program against its machine: verdict limits_only; with `against`
+/// also its shape, by a monotone matching (path_match.h): verdict certified. Else refused.
 Conversion check_program(const CheckInput& in, const Progress& progress);
 
 }  // namespace smoothpost

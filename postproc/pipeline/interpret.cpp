@@ -18,7 +18,8 @@ constexpr AxisMask kRotary = 0x38;
 std::string words_text(AxisMask mask) {
   std::string text;
   for (int i = 0; i < kAxisWords; ++i)
-    if (mask >> i & 1U) text += (text.empty() ? "" : " ") + std::string(1, kAxisLetters[static_cast<std::size_t>(i)]);
+    if (mask >> i & 1U)
+      text += (text.empty() ? "" : " ") + std::string(1, kAxisLetters[static_cast<std::size_t>(i)]);
   return text;
 }
 
@@ -92,8 +93,7 @@ class PathBuilder {
     survey();
     if (recorder_.motions.empty()) fail("NC311", 0, "the program contains no motion");
     if (!has_error(diagnostics_)) build();
-    if (has_error(diagnostics_))
-      return Result<InterpretedInput>::failure(std::move(diagnostics_));
+    if (has_error(diagnostics_)) return Result<InterpretedInput>::failure(std::move(diagnostics_));
     describe();
     return Result<InterpretedInput>(std::move(out_), std::move(diagnostics_));
   }
@@ -105,8 +105,10 @@ class PathBuilder {
       const auto& m = recorder_.motions[i];
       programmed_ |= m.programmed;
       if (m.kind == MotionKind::feed) last_feed_ = i + 1;
-      if (m.tcp) uses_tcp_ = true;
-      else uses_joints_ = true;
+      if (m.tcp)
+        uses_tcp_ = true;
+      else
+        uses_joints_ = true;
     }
     programmed_ |= kXyz;
     for (const auto& s : recorder_.states)
@@ -133,8 +135,10 @@ class PathBuilder {
           add_event(recorder_.events[step.index]);
           break;
         case Recorder::Step::Kind::motion:
-          if (step.index < end_) add_motion(recorder_.motions[step.index]);
-          else skipped_end_.push_back(recorder_.motions[step.index].line);
+          if (step.index < end_)
+            add_motion(recorder_.motions[step.index]);
+          else
+            skipped_end_.push_back(recorder_.motions[step.index].line);
           break;
       }
       if (has_error(diagnostics_)) return;
@@ -155,7 +159,8 @@ class PathBuilder {
     tool_ = tool;
     const auto known = settings_.tool_lengths.find(tool);
     tool_length_ = known == settings_.tool_lengths.end() ? 0.0 : known->second;
-    if (known == settings_.tool_lengths.end() && compensation_ == 0.0) unknown_length_.insert({tool, 0});
+    if (known == settings_.tool_lengths.end() && compensation_ == 0.0)
+      unknown_length_.insert({tool, 0});
   }
 
   void set_offset(const Recorder::State& state) {
@@ -174,7 +179,8 @@ class PathBuilder {
            "work offset system " + system_name(state.system) + " is used besides " +
                system_name(first_system_) +
                " and where it lies is not known: give --input-work-offset " +
-               system_name(state.system) + "=x,y,z (and that of " + system_name(first_system_) + ")");
+               system_name(state.system) + "=x,y,z (and that of " + system_name(first_system_) +
+               ")");
     }
   }
 
@@ -261,13 +267,12 @@ class PathBuilder {
   void push(PathPoint point) {
     if (!out_.path.points.empty() && !point.replanned) {
       const PathPoint& last = out_.path.points.back();
-      const bool same_state = last.compensation == point.compensation &&
-                              last.tip_offset == point.tip_offset &&
-                              last.tool_length == point.tool_length &&
-                              last.interpolation == point.interpolation;
+      const bool same_state =
+          last.compensation == point.compensation && last.tip_offset == point.tip_offset &&
+          last.tool_length == point.tool_length && last.interpolation == point.interpolation;
       if (!same_state) {
-        // The controller changed its reading of the words here: a rapid across that place is ours to
-        // plan; a cut across it would start with a jump of the tip.
+        // The controller changed its reading of the words here: a rapid across that place is ours
+        // to plan; a cut across it would start with a jump of the tip.
         if (point.kind == MotionKind::feed) {
           PathPoint seen = point;
           ReferencePath probe(out_.path, out_.frames);
@@ -276,7 +281,8 @@ class PathBuilder {
           const auto after = probe.location_of_words(last.words, point);
           if ((before.tip - after.tip).norm() > 1e-6) {
             fail("NC314", point.line,
-                 "a feed motion starts right after the tool length or TCP mode changed, where the tip "
+                 "a feed motion starts right after the tool length or TCP mode changed, where the "
+                 "tip "
                  "jumps by " +
                      std::to_string((before.tip - after.tip).norm()) +
                      " mm: program a rapid move between them");
@@ -304,23 +310,27 @@ class PathBuilder {
       if (e.kind == PathEvent::Kind::comment && e.text.rfind("unmapped: ", 0) == 0)
         unmapped.push_back(e.line);
     if (!unmapped.empty())
-      assumes.push_back("words without a mapping are comments that do nothing, on the user's word: lines " +
-                        line_list(unmapped));
+      assumes.push_back(
+          "words without a mapping are comments that do nothing, on the user's word: lines " +
+          line_list(unmapped));
     if (!lost_lines_.empty()) {
       note("the way to the first full position (up to line " + std::to_string(first_line_) +
            ") and over machine positions is re-planned: input lines " + line_list(lost_lines_));
     }
     if (!skipped_end_.empty())
-      note("the motions to machine positions at the end are replaced by the end of the output "
-           "program: input lines " +
-           line_list(skipped_end_));
+      note(
+          "the motions to machine positions at the end are replaced by the end of the output "
+          "program: input lines " +
+          line_list(skipped_end_));
     if (uses_joints_ && settings_.machine && !settings_.work_offsets.contains(first_system_))
-      assumes.push_back("outside TCP mode the program's zero lies at the input machine's zero (no "
-                        "--input-work-offset given)");
-    out_.reference = uses_tcp_ && uses_joints_ ? "TCP mode: tip on lines and arcs, rotary joints linear; "
-                                                 "outside it all joints linear"
-                     : uses_tcp_ ? "tip on lines and arcs, rotary joints of the input machine linear"
-                                 : "joints of the input machine linear, arcs in XYZ";
+      assumes.push_back(
+          "outside TCP mode the program's zero lies at the input machine's zero (no "
+          "--input-work-offset given)");
+    out_.reference =
+        uses_tcp_ && uses_joints_ ? "TCP mode: tip on lines and arcs, rotary joints linear; "
+                                    "outside it all joints linear"
+        : uses_tcp_ ? "tip on lines and arcs, rotary joints of the input machine linear"
+                    : "joints of the input machine linear, arcs in XYZ";
   }
 
   static std::string line_list(std::vector<std::uint32_t> lines) {

@@ -27,14 +27,16 @@ struct InterpretedInput {
   std::vector<std::string> assumes;  ///< what the reading took for granted, for the certificate
   std::string reference;             ///< how the input is interpolated, for the certificate
   std::size_t lines = 0;
-  bool uses_tools = false;           ///< a tool was changed or compensated
-  int system = 1;                    ///< work system of the first motion, 1..9 for G54..G59.3
+  bool uses_tools = false;  ///< a tool was changed or compensated
+  int system = 1;           ///< work system of the first motion, 1..9 for G54..G59.3
 };
 
 /// Reads NC text: parse, modal interpretation, then the input machine's kinematics.
-///  - The way from the unknown position before the program to the first known position, and the way over
-///    positions of the input machine (G53, G28, G30), have no meaning on another machine: such segments are
-///    marked `replanned` (at the end of a program they are left out: the end template takes over).
+///  - The way from the unknown position before the program to the first known position, and the way
+///  over
+///    positions of the input machine (G53, G28, G30), have no meaning on another machine: such
+///    segments are marked `replanned` (at the end of a program they are left out: the end template
+///    takes over).
 ///  - W is the program's coordinate system at its first motion.
 Result<InterpretedInput> interpret_nc(std::string text, const InputSettings& settings);
 

@@ -10,9 +10,11 @@ namespace smoothpost {
 
 namespace {
 
-constexpr double kAxisStep = 2.0 * kRadiansPerDegree;     // between tracked points
-constexpr double kRotaryStep = 30.0 * kRadiansPerDegree;  // of the first rotary, outside the pole cap
-constexpr double kTurnCap = 1.5;  // of the cap: where the first rotary may turn with the axis on the pole
+constexpr double kAxisStep = 2.0 * kRadiansPerDegree;  // between tracked points
+constexpr double kRotaryStep =
+    30.0 * kRadiansPerDegree;  // of the first rotary, outside the pole cap
+constexpr double kTurnCap =
+    1.5;  // of the cap: where the first rotary may turn with the axis on the pole
 constexpr int kMaxSplits = 40;
 
 double nearest_turn(double angle, double reference) {
@@ -24,7 +26,8 @@ class Planner {
   Planner(const ReferencePath& reference, const RotaryPair& pair, const JointPlanSettings& settings,
           const Progress& progress)
       : reference_(reference), pair_(pair), settings_(settings), progress_(progress) {
-    // The pole is the first rotary's own direction, seen from the part; it does not move with the path.
+    // The pole is the first rotary's own direction, seen from the part; it does not move with the
+    // path.
     pole_ = jacobian(pair.chain(), settings.held).col(pair.first_rotary()).head<3>().normalized();
     cap_ = 0.4 * settings.axis_tolerance;
   }
@@ -42,7 +45,8 @@ class Planner {
         if (!refine(from, to, 0)) return too_steep(to.segment);
       }
       samples_.push_back(std::move(to));
-      if (i % 4096 == 0 && !progress_("kinematics", static_cast<double>(i) / static_cast<double>(tracked_.size())))
+      if (i % 4096 == 0 &&
+          !progress_("kinematics", static_cast<double>(i) / static_cast<double>(tracked_.size())))
         return cancelled();
     }
     return Result<std::vector<JointSample>>(std::move(samples_));
@@ -95,7 +99,8 @@ class Planner {
   };
 
   void subdivide(std::size_t segment, const Node& from, const Node& to, int depth) {
-    // A full turn of a rotary has equal ends: the input's own turn decides, not only what the ends show.
+    // A full turn of a rotary has equal ends: the input's own turn decides, not only what the ends
+    // show.
     const double mid_s = 0.5 * (from.s + to.s);
     const bool may_turn = total_turn(segment) * (to.s - from.s) > kRotaryStep;
     if (depth < kMaxSplits && (may_turn || too_far(from.location, to.location))) {
@@ -107,7 +112,8 @@ class Planner {
     add_tracked(segment, to.s, to.location);
   }
 
-  // A bound of the angle that the tool axis sweeps on a segment: the bound of |axis''| is its square.
+  // A bound of the angle that the tool axis sweeps on a segment: the bound of |axis''| is its
+  // square.
   double total_turn(std::size_t segment) const {
     return std::sqrt(reference_.second_derivative_bound(segment).axis);
   }
@@ -134,7 +140,8 @@ class Planner {
       const PathPoint& p = path[tracked_[i].segment];
       points[i].location = locations_[i];
       points[i].line = p.line;
-      // With the axis on the pole the first rotary is free; where it has to turn, it turns on a rapid.
+      // With the axis on the pole the first rotary is free; where it has to turn, it turns on a
+      // rapid.
       const bool may_turn = i > 0 && p.kind == MotionKind::rapid &&
                             in_cap(locations_[i - 1].axis) && in_cap(locations_[i].axis);
       points[i].cut = !p.replanned && !may_turn;
@@ -145,7 +152,8 @@ class Planner {
     return track_branches(pair_, points, s);
   }
 
-  // Splits [from, to] until straight joint motion follows the reference; appends the samples between.
+  // Splits [from, to] until straight joint motion follows the reference; appends the samples
+  // between.
   bool refine(const JointSample& from, const JointSample& to, int depth) {
     if (follows(from, to)) return true;
     if (depth >= kMaxSplits) return false;
@@ -154,8 +162,8 @@ class Planner {
     mid.s = 0.5 * (from.s + to.s);
     const JointVector mean = 0.5 * (from.q + to.q);
     if (!place(mid, mean, 1.0)) return false;
-    // At the rim of the cap the first rotary is on one side of the step whatever the share s is: there the
-    // axis goes onto the pole for the turn, still inside the tolerance.
+    // At the rim of the cap the first rotary is on one side of the step whatever the share s is:
+    // there the axis goes onto the pole for the turn, still inside the tolerance.
     const int first = pair_.first_rotary();
     const double step = std::abs(to.q[first] - from.q[first]);
     if (step > 1e-9 && std::abs(mid.q[first] - mean[first]) > 0.35 * step &&
@@ -170,8 +178,7 @@ class Planner {
 
   // Sets mid.q and mid.branch to the solution nearest to `mean`.
   bool place(JointSample& mid, const JointVector& mean, double cap_share) const {
-    const RotaryPairSolutions solutions =
-        pair_.solve(target(mid.segment, mid.s, cap_share), mean);
+    const RotaryPairSolutions solutions = pair_.solve(target(mid.segment, mid.s, cap_share), mean);
     double best = INFINITY;
     for (int b = 0; b < 2; ++b) {
       if (!solutions.valid[static_cast<std::size_t>(b)]) continue;
@@ -225,18 +232,22 @@ class Planner {
     const std::uint32_t line = reference_.path().points[tracked_[tracking.point].segment].line;
     switch (tracking.status) {
       case BranchTracking::Status::unreachable:
-        out.push_back(at_line("KN101", line, "the tool axis cannot be reached by this machine: " + named(tracking.reason)));
+        out.push_back(
+            at_line("KN101", line,
+                    "the tool axis cannot be reached by this machine: " + named(tracking.reason)));
         break;
       case BranchTracking::Status::over_limit:
-        out.push_back(at_line("KN102", line,
-                              "no position of the machine within its limits: " + named(tracking.reason) +
-                                  ". Place the part elsewhere with --work-offset or choose another machine"));
+        out.push_back(
+            at_line("KN102", line,
+                    "no position of the machine within its limits: " + named(tracking.reason) +
+                        ". Place the part elsewhere with --work-offset or choose another machine"));
         break;
       default:
         for (const auto& rewind : tracking.rewinds)
-          out.push_back(at_line("KN103", rewind.line,
-                                "the cut cannot go on without a rewind here: " + named(rewind.reason) +
-                                    ". Split the cut before this line or choose a machine with more range"));
+          out.push_back(
+              at_line("KN103", rewind.line,
+                      "the cut cannot go on without a rewind here: " + named(rewind.reason) +
+                          ". Split the cut before this line or choose a machine with more range"));
         if (out.empty())
           out.push_back(at_line("KN103", line, "a rewind is needed: " + named(tracking.reason)));
         break;
@@ -245,10 +256,12 @@ class Planner {
   }
 
   Result<std::vector<JointSample>> too_steep(std::size_t segment) const {
-    return Result<std::vector<JointSample>>::failure(at_line(
-        "KN104", reference_.path().points[segment].line,
-        "the machine cannot follow this motion inside the tolerances: a rotary would have to jump (the "
-        "tool axis passes the machine's pole). Widen --axis-tolerance or change the tool axis there"));
+    return Result<std::vector<JointSample>>::failure(
+        at_line("KN104", reference_.path().points[segment].line,
+                "the machine cannot follow this motion inside the tolerances: a rotary would have "
+                "to jump (the "
+                "tool axis passes the machine's pole). Widen --axis-tolerance or change the tool "
+                "axis there"));
   }
 
   static Result<std::vector<JointSample>> cancelled() {

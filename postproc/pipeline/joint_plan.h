@@ -12,7 +12,8 @@
 namespace smoothpost {
 
 struct JointPlanSettings {
-  double tip_tolerance = 0.0;   ///< mm, for the difference between joint-linear motion and the reference
+  double tip_tolerance =
+      0.0;  ///< mm, for the difference between joint-linear motion and the reference
   double axis_tolerance = 0.0;  ///< rad, likewise
   JointVector held;             ///< redundant joints' values; also where the joints start from
   std::string file_name;        ///< for messages
@@ -27,18 +28,18 @@ struct JointSample {
   JointVector q;
 };
 
-/// Joint values along the whole reference path, close enough that straight joint motion from each sample
-/// to the next stays inside the tolerances (checked at quarter points; the certificate bounds it).
-/// One global choice of branch and winding; the last sample of every segment is at s = 1.
-/// `pair` is the output machine's chain with tool length 0 and the part placed in it.
-/// Failures: KN101 unreachable, KN102 limits, KN103 rewind needed (input lines named), KN104 a motion that
-/// cannot be followed inside the tolerances.
-/// Cost: linear in the samples.
+/// Joint values along the whole reference path, close enough that straight joint motion from each
+/// sample to the next stays inside the tolerances (checked at quarter points; the certificate
+/// bounds it). One global choice of branch and winding; the last sample of every segment is at s
+/// = 1. `pair` is the output machine's chain with tool length 0 and the part placed in it.
+/// Failures: KN101 unreachable, KN102 limits, KN103 rewind needed (input lines named), KN104 a
+/// motion that cannot be followed inside the tolerances. Cost: linear in the samples.
 Result<std::vector<JointSample>> plan_joints(const ReferencePath& reference, const RotaryPair& pair,
                                              const JointPlanSettings& settings,
                                              const Progress& progress);
 
-/// The holder's reference point for a tool of `tool_length`: what a chain of tool length 0 is asked for.
+/// The holder's reference point for a tool of `tool_length`: what a chain of tool length 0 is asked
+/// for.
 CutterLocation holder_location(const CutterLocation& tip, double tool_length);
 
 }  // namespace smoothpost

@@ -52,14 +52,15 @@ class Builder {
  private:
   JointMask retract_bit() const { return retract_ < 0 ? 0U : 1U << retract_; }
 
-  // The retract position of the machine file, or further out where the path itself goes further out: a
-  // link never runs below the highest place of the path.
+  // The retract position of the machine file, or further out where the path itself goes further
+  // out: a link never runs below the highest place of the path.
   double retract_beyond_path() const {
     const auto& joint = machine_.axes[static_cast<std::size_t>(retract_)].joint;
     const bool upwards = machine_.links.retract >= 0.5 * (joint.lower + joint.upper);
     double position = machine_.links.retract;
     for (const auto& sample : samples_)
-      position = upwards ? std::max(position, sample.q[retract_]) : std::min(position, sample.q[retract_]);
+      position =
+          upwards ? std::max(position, sample.q[retract_]) : std::min(position, sample.q[retract_]);
     return position;
   }
 
@@ -96,7 +97,8 @@ class Builder {
     if (joints != 0) out_.moves.push_back(std::move(move));
   }
 
-  // The joints with the tool `clearance` further out along its axis: the rotaries stay, the linears move.
+  // The joints with the tool `clearance` further out along its axis: the rotaries stay, the linears
+  // move.
   JointVector clear_of(const JointVector& q) const {
     const Jacobian j = jacobian(chain_, q);
     const Vec3 away = machine_.links.clearance * forward_location(chain_, q).axis;
@@ -115,12 +117,14 @@ class Builder {
     for (int i = 0; i < 3; ++i) clear[column[static_cast<std::size_t>(i)]] += step[i];
     for (const int i : column) {
       const auto& joint = chain_.joints[static_cast<std::size_t>(i)];
-      if (clear[i] < joint.lower || clear[i] > joint.upper) return q;  // no room: the retract axis alone
+      if (clear[i] < joint.lower || clear[i] > joint.upper)
+        return q;  // no room: the retract axis alone
     }
     return clear;
   }
 
-  // From the retract position to q: rotaries, the other linears, down the retract axis, along the tool.
+  // From the retract position to q: rotaries, the other linears, down the retract axis, along the
+  // tool.
   void arrive(const JointVector& q) {
     const JointVector above = clear_of(q);
     add_link(rotary_, above, false);
@@ -149,13 +153,14 @@ class Builder {
     out_.moves.push_back(std::move(move));
   }
 
-  double block_time(const JointVector& from, const MachineMove& move, const PathPoint& point) const {
+  double block_time(const JointVector& from, const MachineMove& move,
+                    const PathPoint& point) const {
     double time = point.duration * (move.to_share - move.from_share);
     for (int j = 0; j < machine_.size(); ++j) {
       const auto& axis = machine_.axes[static_cast<std::size_t>(j)];
       const double step = std::abs(move.to[j] - from[j]);
-      const double share =
-          machine_.tolerance.limit_share * (axis.source == LimitSource::assumed ? kAssumedShare : 1.0);
+      const double share = machine_.tolerance.limit_share *
+                           (axis.source == LimitSource::assumed ? kAssumedShare : 1.0);
       time = std::max(time, step / (axis.velocity * share));
       // A feed that turns the tool in place and says no time: a moderate rate.
       if (point.duration == 0.0 && point.kind == MotionKind::feed &&

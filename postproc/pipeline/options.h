@@ -7,19 +7,19 @@
 
 namespace smoothpost {
 
-/// One run of the tool: every option under the name it has on the command line, in a job file and in the
-/// C structure. Text is as the user wrote it; `settings.h` reads it.
+/// One run of the tool: every option under the name it has on the command line, in a job file and
+/// in the C structure. Text is as the user wrote it; `settings.h` reads it.
 struct Options {
-  std::string command;                ///< convert | check | machines | formats | golden
-  std::vector<std::string> arguments; ///< sub-command words: list, show NAME, run DIR ...
-  std::string input;                  ///< path, or "-"
-  std::optional<std::string> input_data;      ///< bytes given by the host instead of a file
+  std::string command;                    ///< convert | check | machines | formats | golden
+  std::vector<std::string> arguments;     ///< sub-command words: list, show NAME, run DIR ...
+  std::string input;                      ///< path, or "-"
+  std::optional<std::string> input_data;  ///< bytes given by the host instead of a file
   std::string machine;
-  std::string machine_path;           ///< folders separated by ':', searched before the others
-  std::string workpiece;              ///< STL path
+  std::string machine_path;  ///< folders separated by ':', searched before the others
+  std::string workpiece;     ///< STL path
   std::optional<std::string> workpiece_data;
-  std::string workpiece_unit;         ///< mm (default) | inch: the unit of the STL's numbers
-  std::string output;                 ///< path, "-", or empty for the default
+  std::string workpiece_unit;  ///< mm (default) | inch: the unit of the STL's numbers
+  std::string output;          ///< path, "-", or empty for the default
   std::string dialect;
   std::string input_format;
   std::string input_dialect;

@@ -27,10 +27,12 @@ class Metric {
   double between(const CutterLocation& a, const CutterLocation& b) const {
     return std::max((a.tip - b.tip).norm() / tip_, angle_between(a.axis, b.axis) / axis_);
   }
-  double bend(const SecondDerivativeBound& b) const { return std::max(b.tip / tip_, b.axis / axis_); }
+  double bend(const SecondDerivativeBound& b) const {
+    return std::max(b.tip / tip_, b.axis / axis_);
+  }
 
-  /// Steps on a curve of that length (upper bound) and bend so that neighbours are kStep apart at most and
-  /// the curve leaves its chords by at most half of kAllowance.
+  /// Steps on a curve of that length (upper bound) and bend so that neighbours are kStep apart at
+  /// most and the curve leaves its chords by at most half of kAllowance.
   int steps(double length, double bend) const {
     const double by_length = length / kStep;
     const double by_bend = std::sqrt(bend / (8.0 * 0.5 * kAllowance));
@@ -107,13 +109,16 @@ std::vector<Sample> input_samples(const ReferencePath& input, std::size_t first,
 /// The dynamic programme for one stretch; rows are program samples, columns input samples.
 class Stretch {
  public:
-  Stretch(const std::vector<Sample>& input, const Metric& metric) : input_(input), metric_(metric) {}
+  Stretch(const std::vector<Sample>& input, const Metric& metric)
+      : input_(input), metric_(metric) {}
 
-  /// Takes the next program sample; `may_start`: the program has made only rapids since the last stretch.
+  /// Takes the next program sample; `may_start`: the program has made only rapids since the last
+  /// stretch.
   void next(const Sample& sample, bool may_start) {
     std::vector<double> row;
     std::size_t first = 0;
-    const std::size_t band_end = first_ + row_.size();  // one column further can be reached diagonally
+    const std::size_t band_end =
+        first_ + row_.size();  // one column further can be reached diagonally
     double left = kNever;
     for (std::size_t j = may_start ? 0 : first_; j < input_.size(); ++j) {
       double best = std::min({value(j), j > 0 ? value(j - 1) : kNever, left});
@@ -166,7 +171,10 @@ class Matcher {
  public:
   Matcher(const ReadBack& program, const ScrewChain& chain, const ReferencePath& input,
           const PathMatchSettings& settings, const Progress& progress)
-      : program_(program), input_(input), progress_(progress), metric_(settings),
+      : program_(program),
+        input_(input),
+        progress_(progress),
+        metric_(settings),
         samples_(program, chain, metric_) {}
 
   PathMatch run() {
@@ -181,7 +189,8 @@ class Matcher {
     // Behind the last stretch only rapids are left.
     for (std::size_t i = move_; i < program_.moves.size(); ++i)
       if (!program_.moves[i].rapid)
-        return fail(points.back().line, program_.moves[i].line, "a feed move of the program is not in the input");
+        return fail(points.back().line, program_.moves[i].line,
+                    "a feed move of the program is not in the input");
     out_.matched = true;
     out_.share += kAllowance;
     return out_;
@@ -198,7 +207,8 @@ class Matcher {
     if (move_ > 0 && move_ <= program_.moves.size())
       stretch.next(samples_.at_end(move_ - 1, tool_length), true);
     for (std::size_t i = move_; i < program_.moves.size(); ++i) {
-      if (i % 256 == 0 && !progress_("match", static_cast<double>(i) / static_cast<double>(program_.moves.size()))) {
+      if (i % 256 == 0 && !progress_("match", static_cast<double>(i) /
+                                                  static_cast<double>(program_.moves.size()))) {
         fail(0, 0, "cancelled");
         return false;
       }
@@ -212,8 +222,8 @@ class Matcher {
           next_move = i;
         }
       }
-      // A feed has to end where the stretch ends. The latest such place counts: what follows within the
-      // tolerance still belongs to it.
+      // A feed has to end where the stretch ends. The latest such place counts: what follows within
+      // the tolerance still belongs to it.
       if (stretch.finished() < kNever) {
         best = stretch.finished();
         next_move = i + 1;

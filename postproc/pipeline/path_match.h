@@ -17,26 +17,26 @@ struct PathMatchSettings {
 /// Whether a program follows an input, without a line map.
 struct PathMatch {
   bool matched = false;
-  /// Of the best monotone matching, an upper bound of max(tip distance / tip tolerance, axis angle / axis
-  /// tolerance) over the whole path; 0 when nothing matched.
+  /// Of the best monotone matching, an upper bound of max(tip distance / tip tolerance, axis angle
+  /// / axis tolerance) over the whole path; 0 when nothing matched.
   double share = 0.0;
-  std::uint32_t input_line = 0;   ///< of the worst pair; when not matched: how far the matching came
+  std::uint32_t input_line = 0;  ///< of the worst pair; when not matched: how far the matching came
   std::uint32_t output_line = 0;
-  std::string reason;             ///< when not matched
+  std::string reason;  ///< when not matched
 };
 
-/// Searches a monotone matching of the whole input to the program within the tolerances: the Fréchet
-/// decision, by dynamic programming over samples of both.
+/// Searches a monotone matching of the whole input to the program within the tolerances: the
+/// Fréchet decision, by dynamic programming over samples of both.
 ///
-/// Both are sampled in steps of at most a quarter of the tolerances (distance max(tip / tip tolerance,
-/// axis / axis tolerance)); v(i, j) = max(d(i, j), min(v(i−1, j), v(i−1, j−1), v(i, j−1))) is kept for the
-/// pairs with d ≤ 1 − allowance, a band whose width does not grow with the program. A coupling of samples
-/// bounds the distance of the polylines through them; the allowance covers what the curves leave the
-/// polylines (h²/8 times the bound of the second derivative).
-/// The program may have rapids that the input does not have: before it, after it, and where the input's own
-/// way is replanned. A feed move that matches nothing, a dropped or a doubled block end the matching.
-/// `chain` is the program's machine with tool length 0 and the part placed.
-/// Cost: linear in the path length over the tolerance; memory: the band and the samples of one segment run.
+/// Both are sampled in steps of at most a quarter of the tolerances (distance max(tip / tip
+/// tolerance, axis / axis tolerance)); v(i, j) = max(d(i, j), min(v(i−1, j), v(i−1, j−1), v(i,
+/// j−1))) is kept for the pairs with d ≤ 1 − allowance, a band whose width does not grow with the
+/// program. A coupling of samples bounds the distance of the polylines through them; the allowance
+/// covers what the curves leave the polylines (h²/8 times the bound of the second derivative). The
+/// program may have rapids that the input does not have: before it, after it, and where the input's
+/// own way is replanned. A feed move that matches nothing, a dropped or a doubled block end the
+/// matching. `chain` is the program's machine with tool length 0 and the part placed. Cost: linear
+/// in the path length over the tolerance; memory: the band and the samples of one segment run.
 PathMatch match_paths(const ReadBack& program, const ScrewChain& chain, const ReferencePath& input,
                       const PathMatchSettings& settings, const Progress& progress);
 

@@ -36,7 +36,8 @@ JointVector ReferencePath::joints_of(const AxisWords& words, double compensation
   return q;
 }
 
-CutterLocation ReferencePath::location_of_words(const AxisWords& words, const PathPoint& like) const {
+CutterLocation ReferencePath::location_of_words(const AxisWords& words,
+                                                const PathPoint& like) const {
   require(like.interpolation != PathInterpolation::great_circle,
           "words need an interpolation by words");
   CutterLocation location;
@@ -64,8 +65,8 @@ AxisWords ReferencePath::words_at(std::size_t segment, double s) const {
     const ArcGeometry& arc = path_.arcs[static_cast<std::size_t>(to.arc)];
     const Vec3 start = xyz(from.words);
     const double rise = arc.normal.dot(xyz(to.words) - start);
-    // The end may miss the circle of the start by the controller's centre tolerance: the radius goes
-    // linearly from one to the other.
+    // The end may miss the circle of the start by the controller's centre tolerance: the radius
+    // goes linearly from one to the other.
     const Vec3 spoke = start - arc.centre - arc.normal * arc.normal.dot(start - arc.centre);
     const Vec3 end_offset = xyz(to.words) - arc.centre;
     const double end_radius = (end_offset - arc.normal * arc.normal.dot(end_offset)).norm();

@@ -6,15 +6,15 @@
 #include "machines/dialects/dialect.h"
 #include "postproc/pipeline/interpret.h"
 
-// The explicit tables of what this version reads and writes, sorted by name. A new format or dialect is
-// one row.
+// The explicit tables of what this version reads and writes, sorted by name. A new format or
+// dialect is one row.
 namespace smoothpost {
 
 struct InputFormat {
-  const char* name;         ///< --input-format
+  const char* name;  ///< --input-format
   const char* description;
-  const char* extensions;   ///< lower case, separated by blanks
-  bool has_words;           ///< axis words of a machine: needs --input-machine when rotary
+  const char* extensions;  ///< lower case, separated by blanks
+  bool has_words;          ///< axis words of a machine: needs --input-machine when rotary
   Result<InterpretedInput> (*read)(std::string text, const InputSettings& settings);
 };
 

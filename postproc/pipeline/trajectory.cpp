@@ -36,7 +36,8 @@ class Writer {
   void row(double t, const JointVector& q, bool beam) {
     append_decimal(text_, t, 6);
     for (int j = 0; j < machine_.size(); ++j) {
-      const bool rotary = machine_.axes[static_cast<std::size_t>(j)].joint.kind == JointKind::rotary;
+      const bool rotary =
+          machine_.axes[static_cast<std::size_t>(j)].joint.kind == JointKind::rotary;
       text_ += ',';
       append_decimal(text_, rotary ? degrees_from_radians(q[j]) : q[j], rotary ? 7 : 6);
     }

@@ -11,7 +11,9 @@ namespace smoothpost {
 namespace {
 
 bool is_rotary(const AxisDefinition& axis) { return axis.joint.kind == JointKind::rotary; }
-double display_scale(const AxisDefinition& axis) { return is_rotary(axis) ? kDegreesPerRadian : 1.0; }
+double display_scale(const AxisDefinition& axis) {
+  return is_rotary(axis) ? kDegreesPerRadian : 1.0;
+}
 std::string unit_of(const AxisDefinition& axis) { return is_rotary(axis) ? "deg" : "mm"; }
 
 std::string source_name(LimitSource source) {
@@ -121,8 +123,8 @@ void check_axes(const ReadBack& read, const MachineDefinition& machine,
     Check position = share.check("position_limit." + axis.name, 1.0, "share of range");
     position.ok = position.value <= 1.0 + 1e-12;
     out.checks.push_back(position);
-    Check v = speed.check("velocity_limit." + axis.name, summary.limit_velocity,
-                          summary.unit + "/s");
+    Check v =
+        speed.check("velocity_limit." + axis.name, summary.limit_velocity, summary.unit + "/s");
     v.planned = true;
     velocity.push_back(v);
     out.axes.push_back(std::move(summary));
@@ -153,8 +155,8 @@ void check_beam(const ReadBack& read, Checks& checks) {
       if (e.beam && !beam) moved_since_on = false;
       beam = e.beam;
       // A dwell between beam on and the first motion is the pierce.
-      const bool waits = e.name == "dwell" || e.name == event_name::kStop ||
-                         e.name == event_name::kOptionalStop;
+      const bool waits =
+          e.name == "dwell" || e.name == event_name::kStop || e.name == event_name::kOptionalStop;
       const bool pierce = e.name == "dwell" && !moved_since_on;
       if (waits && beam && !pierce) {
         dwells += e.name == "dwell" ? e.seconds : 1.0;
@@ -199,9 +201,10 @@ Verification verify_machine(const ReadBack& read, const MachineDefinition& machi
   if (machine.dialect.offset_guard)
     out.checks.push_back(rule("offset_guard", read.offset_guard ? 0.0 : 1.0, "missing", 0,
                               "the guard against live offsets is missing or was changed"));
-  out.checks.push_back(rule("exact_path", read.exact_path ? 0.0 : 1.0, "missing", 0,
-                            "the controller may blend between blocks by an amount without a bound: set "
-                            "dialect.path_mode = \"exact\""));
+  out.checks.push_back(
+      rule("exact_path", read.exact_path ? 0.0 : 1.0, "missing", 0,
+           "the controller may blend between blocks by an amount without a bound: set "
+           "dialect.path_mode = \"exact\""));
   return out;
 }
 
@@ -209,7 +212,8 @@ namespace {
 
 class DeviationCheck {
  public:
-  DeviationCheck(const ReadBack& read, const MachineDefinition& machine, const DeviationInput& input)
+  DeviationCheck(const ReadBack& read, const MachineDefinition& machine,
+                 const DeviationInput& input)
       : read_(read), machine_(machine), in_(input), times_(move_times(read, machine)) {}
 
   Checks run(const Progress& progress) {
@@ -226,8 +230,8 @@ class DeviationCheck {
         }
       }
       checks.push_back(tip_.check("tip_deviation", machine_.tolerance.tip, "mm"));
-      checks.push_back(axis_.check("axis_deviation",
-                                   degrees_from_radians(machine_.tolerance.axis), "deg"));
+      checks.push_back(
+          axis_.check("axis_deviation", degrees_from_radians(machine_.tolerance.axis), "deg"));
       add_round_trip(checks);
     }
     if (has_beam(machine_)) check_beam_in_links(checks);
@@ -243,12 +247,12 @@ class DeviationCheck {
   }
 
  private:
-  // Every motion of the text is one entry of the map, in order, and the entries of the input's segments
-  // follow each other without a gap from the first to the last.
+  // Every motion of the text is one entry of the map, in order, and the entries of the input's
+  // segments follow each other without a gap from the first to the last.
   void check_map() {
     if (read_.moves.size() != in_.map.size())
-      return broken(0, "the program has " + std::to_string(read_.moves.size()) + " motions, planned were " +
-                           std::to_string(in_.map.size()));
+      return broken(0, "the program has " + std::to_string(read_.moves.size()) +
+                           " motions, planned were " + std::to_string(in_.map.size()));
     if (!in_.map.empty() && in_.map.front().role == MoveRole::path)
       return broken(in_.map.front().output_line, "the way to the first point is missing");
     std::size_t segment = 0;
@@ -263,7 +267,8 @@ class DeviationCheck {
         ++segment;
       const bool next = share == 1.0 && e.segment == segment + 1 && e.from_share == 0.0;
       const bool goes_on = e.segment == segment && e.from_share == share && share < 1.0;
-      if (!next && !goes_on) return broken(e.output_line, "a part of the tool path is missing or doubled");
+      if (!next && !goes_on)
+        return broken(e.output_line, "a part of the tool path is missing or doubled");
       if (!(e.to_share > e.from_share)) return broken(e.output_line, "a block goes backwards");
       segment = e.segment;
       share = e.to_share;
@@ -299,8 +304,8 @@ class DeviationCheck {
       const Vec3 tip = holder.tip - tool_length * holder.axis;
       tip_.see((tip - wanted.tip).norm() + h2 * tip_bend, move.line, times_[i], e.input_line);
       const double chord = (holder.axis - wanted.axis).norm() + h2 * axis_bend;
-      axis_.see(degrees_from_radians(2.0 * std::asin(std::min(1.0, 0.5 * chord))), move.line, times_[i],
-                e.input_line);
+      axis_.see(degrees_from_radians(2.0 * std::asin(std::min(1.0, 0.5 * chord))), move.line,
+                times_[i], e.input_line);
     }
   }
 
@@ -325,12 +330,12 @@ class DeviationCheck {
     for (int j = 0; j < machine_.size(); ++j) {
       const auto& axis = machine_.axes[static_cast<std::size_t>(j)];
       const bool inch = machine_.dialect.units == "inch";
-      const int digits = is_rotary(axis) ? machine_.dialect.digits_angle : machine_.dialect.digits_length;
+      const int digits =
+          is_rotary(axis) ? machine_.dialect.digits_angle : machine_.dialect.digits_length;
       const double unit = is_rotary(axis) || !inch ? 1.0 : kMillimetresPerInch;
       const double half_digit = 0.5 * std::pow(10.0, -digits) * unit;
-      checks.push_back(joints_[static_cast<std::size_t>(j)].check("round_trip." + axis.name,
-                                                                  half_digit * (1.0 + 1e-6),
-                                                                  unit_of(axis)));
+      checks.push_back(joints_[static_cast<std::size_t>(j)].check(
+          "round_trip." + axis.name, half_digit * (1.0 + 1e-6), unit_of(axis)));
     }
   }
 

@@ -27,7 +27,8 @@ struct AxisSummary {
 struct Verification {
   Checks checks;
   std::vector<AxisSummary> axes;
-  double scheduled_time = 0.0;  ///< s, of the output: feeds as printed, rapids at the velocity limits
+  double scheduled_time =
+      0.0;  ///< s, of the output: feeds as printed, rapids at the velocity limits
   std::size_t beam_on_samples = 0;
 };
 
@@ -43,10 +44,12 @@ struct DeviationInput {
   const ScrewChain& chain;  ///< output machine, tool length 0, part placed
 };
 
-/// The output's text, read back, against the input: tip and tool axis everywhere along every block at equal
-/// path parameter, the completeness and order of the map, and the printed against the planned joints.
+/// The output's text, read back, against the input: tip and tool axis everywhere along every block
+/// at equal path parameter, the completeness and order of the map, and the printed against the
+/// planned joints.
 ///
-/// On a block with K steps of size h = 1/K in τ ∈ [0, 1] the deviation d(τ) = output − input satisfies
+/// On a block with K steps of size h = 1/K in τ ∈ [0, 1] the deviation d(τ) = output − input
+/// satisfies
 ///   |d(τ)| ≤ max(|d_k|, |d_k+1|) + h²/8 · (sup|output''| + sup|input''|),
 /// where the suprema are proven bounds (second_derivative_bound), so the value printed bounds the
 /// deviation between samples too. The axis deviation is the angle of the chord |a_out − a_in|.

@@ -23,16 +23,23 @@ Json number(double value) {
 }
 
 Json check_json(const Check& c) {
-  Json j = {{"name", c.name}, {"value", number(c.value)}, {"limit", number(c.limit)}, {"unit", c.unit},
-            {"ok", c.ok},     {"planned", c.planned},     {"input_line", c.input_line},
-            {"output_line", c.output_line}, {"time_s", number(c.time_s)}};
+  Json j = {{"name", c.name},
+            {"value", number(c.value)},
+            {"limit", number(c.limit)},
+            {"unit", c.unit},
+            {"ok", c.ok},
+            {"planned", c.planned},
+            {"input_line", c.input_line},
+            {"output_line", c.output_line},
+            {"time_s", number(c.time_s)}};
   if (!c.note.empty()) j["note"] = c.note;
   return j;
 }
 
 Json diagnostic_json(const Diagnostic& d) {
-  return {{"file", d.where.file},   {"line", d.where.line}, {"column", d.where.column},
-          {"severity", to_string(d.severity)}, {"code", d.code}, {"text", d.text}};
+  return {{"file", d.where.file},     {"line", d.where.line},
+          {"column", d.where.column}, {"severity", to_string(d.severity)},
+          {"code", d.code},           {"text", d.text}};
 }
 
 Json axis_json(const AxisSummary& a) {
@@ -40,7 +47,8 @@ Json axis_json(const AxisSummary& a) {
   return {{"name", a.name},
           {"unit", a.unit},
           {"position", {number(a.position_low), number(a.position_high)}},
-          {"peak", {{"velocity", number(a.peak_velocity)}, {"acceleration", nullptr}, {"jerk", nullptr}}},
+          {"peak",
+           {{"velocity", number(a.peak_velocity)}, {"acceleration", nullptr}, {"jerk", nullptr}}},
           {"limit",
            {{"velocity", number(a.limit_velocity)},
             {"acceleration", number(a.limit_acceleration)},
@@ -69,31 +77,35 @@ std::string report_json(const Conversion& c, const ReportContext& context) {
   j["machine"] = context.machine;
   j["dialect"] = context.dialect;
   j["verdict"] = to_string(c.verdict);
-  j["certificate"] = {
-      {"level", c.level},
-      {"interpolation", c.interpolation},
-      {"reference", c.reference},
-      {"assumes", c.assumes},
-      {"not_checked", c.not_checked},
-      {"budget_mm",
-       {{"merge", number(c.budget_mm.merge)},
-        {"smoothing", number(c.budget_mm.smoothing)},
-        {"chord", number(c.budget_mm.chord)},
-        {"rounding", number(c.budget_mm.rounding)},
-        {"controller", number(c.budget_mm.controller)}}},
-      {"input_sha256", context.input_sha256},
-      {"program_sha256", context.program_sha256},
-      {"machine_sha256", context.machine_sha256}};
-  j["input"] = {{"file", context.input_file},     {"format", context.input_format},
-                {"dialect", context.input_dialect}, {"lines", context.input_lines},
-                {"cuts", c.cuts},                 {"links", c.links},
-                {"cutter_locations", context.cutter_locations}, {"length_mm", number(c.length)}};
+  j["certificate"] = {{"level", c.level},
+                      {"interpolation", c.interpolation},
+                      {"reference", c.reference},
+                      {"assumes", c.assumes},
+                      {"not_checked", c.not_checked},
+                      {"budget_mm",
+                       {{"merge", number(c.budget_mm.merge)},
+                        {"smoothing", number(c.budget_mm.smoothing)},
+                        {"chord", number(c.budget_mm.chord)},
+                        {"rounding", number(c.budget_mm.rounding)},
+                        {"controller", number(c.budget_mm.controller)}}},
+                      {"input_sha256", context.input_sha256},
+                      {"program_sha256", context.program_sha256},
+                      {"machine_sha256", context.machine_sha256}};
+  j["input"] = {{"file", context.input_file},
+                {"format", context.input_format},
+                {"dialect", context.input_dialect},
+                {"lines", context.input_lines},
+                {"cuts", c.cuts},
+                {"links", c.links},
+                {"cutter_locations", context.cutter_locations},
+                {"length_mm", number(c.length)}};
   j["output"] = {{"lines", std::count(c.program.begin(), c.program.end(), '\n')},
                  {"blocks", c.blocks},
                  {"bytes", c.program.size()}};
   j["checks"] = std::move(checks);
   j["axes"] = std::move(axes);
-  j["time_s"] = {{"programmed", number(c.programmed_time)}, {"scheduled", number(c.scheduled_time)}};
+  j["time_s"] = {{"programmed", number(c.programmed_time)},
+                 {"scheduled", number(c.scheduled_time)}};
   j["diagnostics"] = std::move(diagnostics);
   if (context.timings) {
     Json stages = Json::array();
@@ -114,7 +126,8 @@ std::string line_map_json(const LineMap& map, const std::string& input_file) {
     const LineMapEntry& e = map[i];
     text += i ? ",\n[" : "\n[";
     text += std::to_string(e.output_line) + "," + std::to_string(e.input_line) +
-            (e.role == MoveRole::path ? ",\"path\"," : ",\"link\",") + std::to_string(e.segment) + ",";
+            (e.role == MoveRole::path ? ",\"path\"," : ",\"link\",") + std::to_string(e.segment) +
+            ",";
     append_decimal(text, e.from_share, 9);
     text += ',';
     append_decimal(text, e.to_share, 9);
@@ -137,7 +150,8 @@ std::string changed_checks(const std::string& expected_report, const std::string
     return expected_report == actual_report ? "" : "    a report is missing or no JSON\n";
   }
   const auto row = [](const Json& check) {
-    return check.value("value", Json(nullptr)).dump() + (check.value("ok", false) ? " ok" : " FAILED");
+    return check.value("value", Json(nullptr)).dump() +
+           (check.value("ok", false) ? " ok" : " FAILED");
   };
   const auto find = [](const Json& report, const std::string& name) {
     for (const auto& check : report.value("checks", Json::array()))
@@ -153,12 +167,15 @@ std::string changed_checks(const std::string& expected_report, const std::string
   };
   std::string text;
   if (before.value("verdict", "") != after.value("verdict", ""))
-    text += "    verdict: expected " + before.value("verdict", "") + ", now " + after.value("verdict", "") + "\n";
+    text += "    verdict: expected " + before.value("verdict", "") + ", now " +
+            after.value("verdict", "") + "\n";
   for (const auto& a : before.value("checks", Json::array())) {
     const std::string name = a.value("name", "");
     const Json b = find(after, name);
-    if (b.is_null()) text += "    " + name + ": expected " + row(a) + ", now absent\n";
-    else if (!close(a, b)) text += "    " + name + ": expected " + row(a) + ", now " + row(b) + "\n";
+    if (b.is_null())
+      text += "    " + name + ": expected " + row(a) + ", now absent\n";
+    else if (!close(a, b))
+      text += "    " + name + ": expected " + row(a) + ", now " + row(b) + "\n";
   }
   for (const auto& b : after.value("checks", Json::array()))
     if (find(before, b.value("name", "")).is_null())

@@ -29,9 +29,9 @@ std::string report_json(const Conversion& conversion, const ReportContext& conte
 /// The line map: one row [output line, input line, "path"|"link", segment, from, to] per motion.
 std::string line_map_json(const LineMap& map, const std::string& input_file);
 
-/// A table of the checks in which two reports differ: name, expected and actual value and verdict. Values
-/// that differ by at most `relative` of the limit (or of the value, when the limit is 0) count as equal.
-/// Empty when there is none; one line when a report cannot be read.
+/// A table of the checks in which two reports differ: name, expected and actual value and verdict.
+/// Values that differ by at most `relative` of the limit (or of the value, when the limit is 0)
+/// count as equal. Empty when there is none; one line when a report cannot be read.
 std::string changed_checks(const std::string& expected_report, const std::string& actual_report,
                            double relative);
 

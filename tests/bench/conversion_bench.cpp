@@ -1,5 +1,6 @@
-// Whole conversions from text in memory to a certified program in memory, with growth in size, beside a
-// floor: the closed form and forward kinematics of as many poses as the certificate looked at.
+// Whole conversions from text in memory to a certified program in memory, with growth in size,
+// beside a floor: the closed form and forward kinematics of as many poses as the certificate looked
+// at.
 
 #include <benchmark/benchmark.h>
 
@@ -34,7 +35,8 @@ std::string generated(int n) {
   for (int i = 0; i < n; ++i) {
     const double t = 0.01 * i;
     std::snprintf(line, sizeof line, "G1 X%.3f Y%.3f Z%.3f A%.3f C%.3f F600\n", 30 * std::cos(t),
-                  30 * std::sin(t), 2 * std::sin(3 * t), -20 - 5 * std::sin(2 * t), 10 * std::sin(t));
+                  30 * std::sin(t), 2 * std::sin(3 * t), -20 - 5 * std::sin(2 * t),
+                  10 * std::sin(t));
     text += line;
   }
   return text + "G0 Z60\nM429\nM30\n%\n";
@@ -71,7 +73,8 @@ void convert_generated(benchmark::State& state) {
 void convert_boat(benchmark::State& state, const char* name, const char* from, int tool) {
   const fs::path path = fs::path(SMOOTHPOST_SOURCE_DIR).parent_path() /
                         "shared/corpus/1_five_axis/LinuxCNC/configs/sim/axis/vismach/5axis/"
-                        "table-rotary-tilting/demos" / name;
+                        "table-rotary-tilting/demos" /
+                        name;
   if (!fs::exists(path)) {
     state.SkipWithError("the corpus is not here");
     return;
@@ -97,10 +100,17 @@ void floor_kinematics(benchmark::State& state) {
     }
 }
 
-BENCHMARK(convert_generated)->Arg(1000)->Arg(10000)->Arg(100000)->Unit(benchmark::kMillisecond)->Complexity();
+BENCHMARK(convert_generated)
+    ->Arg(1000)
+    ->Arg(10000)
+    ->Arg(100000)
+    ->Unit(benchmark::kMillisecond)
+    ->Complexity();
 BENCHMARK(floor_kinematics)->Arg(10000)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(convert_boat, boat_xyzac, "boat-xyzac.ngc", "table_table_ac", 0)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(convert_boat, boat_xyzbc, "boat-xyzbc.ngc", "table_table_bc", 1)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(convert_boat, boat_xyzac, "boat-xyzac.ngc", "table_table_ac", 0)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(convert_boat, boat_xyzbc, "boat-xyzbc.ngc", "table_table_bc", 1)
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 

@@ -1,5 +1,5 @@
-// Emission of joint words and reading them back, beside what a program can do at best in the same run:
-// the same numbers printed as scaled integers, by std::to_chars and by snprintf.
+// Emission of joint words and reading them back, beside what a program can do at best in the same
+// run: the same numbers printed as scaled integers, by std::to_chars and by snprintf.
 
 #include <benchmark/benchmark.h>
 
@@ -24,7 +24,8 @@ using namespace smoothpost;
 constexpr int kMoves = 100000;
 
 MachineDefinition table_bc() {
-  const std::string path = std::string(SMOOTHPOST_SOURCE_DIR) + "/machines/table_table_bc/machine.toml";
+  const std::string path =
+      std::string(SMOOTHPOST_SOURCE_DIR) + "/machines/table_table_bc/machine.toml";
   std::ifstream in(path);
   const std::string text(std::istreambuf_iterator<char>(in), {});
   return parse_machine_file(text, path).value();
@@ -92,12 +93,15 @@ void floor_of(benchmark::State& state, Print print) {
 }
 
 void floor_scaled_integers(benchmark::State& state) {
-  floor_of(state, [](std::string& text, double value, int digits) { append_decimal(text, value, digits); });
+  floor_of(state, [](std::string& text, double value, int digits) {
+    append_decimal(text, value, digits);
+  });
 }
 void floor_to_chars(benchmark::State& state) {
   floor_of(state, [](std::string& text, double value, int digits) {
     char buffer[64];
-    const auto end = std::to_chars(buffer, buffer + 64, value, std::chars_format::fixed, digits).ptr;
+    const auto end =
+        std::to_chars(buffer, buffer + 64, value, std::chars_format::fixed, digits).ptr;
     text.append(buffer, end);
   });
 }

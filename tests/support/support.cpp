@@ -10,7 +10,9 @@ namespace smoothpost::test {
 
 namespace fs = std::filesystem;
 
-fs::path source_path(std::string_view relative) { return fs::path(SMOOTHPOST_SOURCE_DIR) / relative; }
+fs::path source_path(std::string_view relative) {
+  return fs::path(SMOOTHPOST_SOURCE_DIR) / relative;
+}
 
 std::optional<fs::path> shared_path(std::string_view relative) {
   const fs::path path = fs::path(SMOOTHPOST_SOURCE_DIR).parent_path() / "shared" / relative;
@@ -28,7 +30,8 @@ std::vector<fs::path> corpus_files(std::string_view folder,
     fs::path path = entry.path();
     if (path.extension() == ".gz") path.replace_extension();
     std::string name = path.filename().string();
-    std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
+    std::transform(name.begin(), name.end(), name.begin(),
+                   [](unsigned char c) { return std::tolower(c); });
     for (const auto& extension : extensions)
       if (name.size() >= extension.size() &&
           name.compare(name.size() - extension.size(), extension.size(), extension) == 0) {

@@ -11,8 +11,8 @@ namespace smoothpost::test {
 /// A file of the source tree.
 std::filesystem::path source_path(std::string_view relative);
 
-/// A file of the shared reference material beside the checkout (../shared), or nothing when it is not
-/// there: tests that need it then skip with a WARN.
+/// A file of the shared reference material beside the checkout (../shared), or nothing when it is
+/// not there: tests that need it then skip with a WARN.
 std::optional<std::filesystem::path> shared_path(std::string_view relative);
 
 /// Every regular file below ../shared/corpus/<folder> whose name ends in one of `extensions`

@@ -148,7 +148,7 @@ def check_equations(root):
 
 # --- checks ----------------------------------------------------------------------------------------
 
-CHECK_NAME = re.compile(r'(?:\.check\(|\brule\(|\.name = )"([a-z_]+\.?)"')
+CHECK_NAME = re.compile(r'(?:\.check\(|\brule\(|\.name =)\s*"([a-z_]+\.?)"')
 CHECK_ROW = re.compile(r"^`([a-z_]+\.?)(?:<axis>)?`$")
 
 

@@ -31,8 +31,9 @@ TEST_CASE("append_decimal: fixed notation, no trailing zeros, never -0", "[machi
   CHECK_THROWS_AS(text(1.0, 10), ContractViolation);
 }
 
-TEST_CASE("append_decimal: within half a digit of the value, and rounded_decimal is what is printed",
-          "[machines][dialects]") {
+TEST_CASE(
+    "append_decimal: within half a digit of the value, and rounded_decimal is what is printed",
+    "[machines][dialects]") {
   std::mt19937_64 rng(5);
   std::uniform_real_distribution<double> exponent(-9.0, 5.0), sign(-1.0, 1.0);
   std::uniform_int_distribution<int> digits(0, 9);
@@ -41,7 +42,8 @@ TEST_CASE("append_decimal: within half a digit of the value, and rounded_decimal
     const int decimals = digits(rng);
     const std::string printed = text(value, decimals);
     double back = 0.0;
-    const auto [end, error] = std::from_chars(printed.data(), printed.data() + printed.size(), back);
+    const auto [end, error] =
+        std::from_chars(printed.data(), printed.data() + printed.size(), back);
     REQUIRE(error == std::errc());
     REQUIRE(end == printed.data() + printed.size());
     REQUIRE(std::abs(back - value) <= 0.5 * std::pow(10.0, -decimals) * (1 + 1e-9) + 1e-10);

@@ -47,14 +47,16 @@ MachineAction event(const char* name, std::size_t before) {
 
 }  // namespace
 
-TEST_CASE("linuxcnc: read_back(emit(x)) is x to the printed digits, mm and inch", "[machines][dialects]") {
+TEST_CASE("linuxcnc: read_back(emit(x)) is x to the printed digits, mm and inch",
+          "[machines][dialects]") {
   std::mt19937 rng(2);
   for (const auto& name : shipped_machine_names())
     for (const char* units : {"mm", "inch"}) {
       const auto machine = shipped_machine(name, {{"dialect.units", units}});
       const double length_digit = std::pow(10.0, -machine.dialect.digits_length) *
                                   (std::string(units) == "inch" ? kMillimetresPerInch : 1.0);
-      const double angle_digit = radians_from_degrees(std::pow(10.0, -machine.dialect.digits_angle));
+      const double angle_digit =
+          radians_from_degrees(std::pow(10.0, -machine.dialect.digits_angle));
       for (int round = 0; round < 20; ++round) {
         const MachineProgram program = random_program(machine, rng, 100);
         const auto emitted = linuxcnc::emit(machine, program);
@@ -72,7 +74,8 @@ TEST_CASE("linuxcnc: read_back(emit(x)) is x to the printed digits, mm and inch"
           REQUIRE(back.rapid == planned.rapid);
           if (!planned.rapid) REQUIRE(back.duration == Approx(planned.duration).epsilon(1e-5));
           for (int j = 0; j < machine.size(); ++j) {
-            const bool rotary = machine.axes[static_cast<std::size_t>(j)].joint.kind == JointKind::rotary;
+            const bool rotary =
+                machine.axes[static_cast<std::size_t>(j)].joint.kind == JointKind::rotary;
             REQUIRE(std::abs(back.to[j] - planned.to[j]) <=
                     0.5 * (rotary ? angle_digit : length_digit) * (1 + 1e-6));
           }
@@ -116,7 +119,8 @@ TEST_CASE("linuxcnc: an event without words is refused with its line, and never 
   CHECK(refused.diagnostics()[0].code == "PR201");
   CHECK(refused.diagnostics()[0].where.line == 7);
   CHECK(refused.diagnostics()[0].text.find("spindle_on") != std::string::npos);
-  const auto commented = linuxcnc::emit(shipped_machine("laser_5p1", {{"process.unmapped", "comment"}}), program);
+  const auto commented =
+      linuxcnc::emit(shipped_machine("laser_5p1", {{"process.unmapped", "comment"}}), program);
   REQUIRE(commented.ok());
   CHECK(commented.value().text.find("(unmapped event: spindle_on)") != std::string::npos);
 }
@@ -137,7 +141,8 @@ TEST_CASE("linuxcnc: what could move differently than certified is not read as c
           "[machines][dialects]") {
   const auto machine = shipped_machine("table_table_bc");
   const auto reads = [&](const std::string& body) {
-    const auto read = linuxcnc::read_back(machine, "%\nG21 G90 G49 G54\nG61\n" + body + "\nM2\n%\n", "p");
+    const auto read =
+        linuxcnc::read_back(machine, "%\nG21 G90 G49 G54\nG61\n" + body + "\nM2\n%\n", "p");
     return read.ok() ? (read.value().exact_path ? "exact" : "blends") : "refused";
   };
   CHECK(std::string(reads("G0 X1 Y2 Z3 B0 C0")) == "exact");

@@ -156,7 +156,8 @@ TEST_CASE("run_job: files are written, nothing on refusal but the report", "[pos
   CHECK(status(run_job(o, {})) == 2);
 }
 
-TEST_CASE("write_file: old content or new, through links, and a reason when it cannot", "[postproc][jobs]") {
+TEST_CASE("write_file: old content or new, through links, and a reason when it cannot",
+          "[postproc][jobs]") {
   const fs::path folder = scratch("write");
   const fs::path file = folder / "a.txt";
   CHECK(write_file(file.string(), "one").empty());
@@ -183,16 +184,19 @@ TEST_CASE("read_file: missing, folder, too large", "[postproc][jobs]") {
 TEST_CASE("options of people: offsets, tools, numbers", "[postproc][jobs]") {
   CHECK(read_number("1.5").value() == 1.5);
   CHECK(read_number(" +2 ").value() == 2.0);
-  for (const char* bad : {"", "1,5", "x", "1.5mm", "nan", "inf", "1e400"}) CHECK_FALSE(read_number(bad));
+  for (const char* bad : {"", "1,5", "x", "1.5mm", "nan", "inf", "1e400"})
+    CHECK_FALSE(read_number(bad));
   const auto offsets = read_offsets({"G54=1,-2,3.5", "G59.1=0,0,0,10,20,30"}, "--work-offset");
   REQUIRE(offsets.ok());
   CHECK(offsets.value()[0].position == Vec3(1, -2, 3.5));
   CHECK(offsets.value()[1].system == 7);
   CHECK(offsets.value()[1].turn.z() == Approx(0.5235987756));
-  for (const char* bad : {"G54", "G54=", "G54=1,2", "G53=1,2,3", "G54=1,2,x", "1,2,3", "G54=1,2,3,4"})
+  for (const char* bad :
+       {"G54", "G54=", "G54=1,2", "G53=1,2,3", "G54=1,2,x", "1,2,3", "G54=1,2,3,4"})
     CHECK_FALSE(read_offsets({bad}, "--work-offset").ok());
   CHECK(read_tools({"1=60", "12=0.5"}).value().at(12) == 0.5);
-  for (const char* bad : {"1", "=5", "x=5", "1=-3", "1.5=2", "1=1e9"}) CHECK_FALSE(read_tools({bad}).ok());
+  for (const char* bad : {"1", "=5", "x=5", "1=-3", "1.5=2", "1=1e9"})
+    CHECK_FALSE(read_tools({bad}).ok());
 }
 
 TEST_CASE("text_difference: changed lines with their numbers", "[postproc][jobs]") {
@@ -210,10 +214,11 @@ TEST_CASE("golden: a changed program, check, message or status is found", "[post
   const fs::path c = folder / "case";
   fs::create_directories(c);
   fs::copy_file(test::source_path("examples/mill_ac/mill_ac.ngc"), c / "part.ngc");
-  std::ofstream(c / "case.toml") << "why = \"test\"\nmode = \"exact\"\n[options]\ncommand = \"convert\"\n"
-                                    "input = \"part.ngc\"\ntool = \"1=60\"\nmachine_path = \""
-                                 << test::source_path("machines").string()
-                                 << "\"\nmachine = \"table_table_bc\"\ninput_machine = \"table_table_ac\"\n";
+  std::ofstream(c / "case.toml")
+      << "why = \"test\"\nmode = \"exact\"\n[options]\ncommand = \"convert\"\n"
+         "input = \"part.ngc\"\ntool = \"1=60\"\nmachine_path = \""
+      << test::source_path("machines").string()
+      << "\"\nmachine = \"table_table_bc\"\ninput_machine = \"table_table_ac\"\n";
   Options o;
   o.command = "golden";
   o.arguments = {"update", folder.string()};

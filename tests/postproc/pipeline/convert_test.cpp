@@ -82,7 +82,8 @@ TEST_CASE("convert: the certified deviation bounds an independent dense comparis
   const Conversion c = convert(in, false, {});
   REQUIRE(c.verdict == Verdict::certified);
   const ReferencePath reference(in.input.path, in.input.frames);
-  // The output machine's forward kinematics written out: p_M = Ry(B) Rz(C) p_W, tool along Z, length 60.
+  // The output machine's forward kinematics written out: p_M = Ry(B) Rz(C) p_W, tool along Z,
+  // length 60.
   const auto tip_in_part = [&](const JointVector& q) {
     const Mat3 table = rotation_about(Vec3::UnitY(), q[3]) * rotation_about(Vec3::UnitZ(), q[4]);
     return CutterLocation{table.transpose() * (Vec3(q[0], q[1], q[2]) - Vec3(0, 0, 60)),
@@ -97,7 +98,8 @@ TEST_CASE("convert: the certified deviation bounds an independent dense comparis
     if (e.role != MoveRole::path) continue;
     for (int k = 0; k <= 50; ++k) {
       const double t = k / 50.0;
-      const auto out = tip_in_part(c.read.moves[i - 1].to + t * (c.read.moves[i].to - c.read.moves[i - 1].to));
+      const auto out =
+          tip_in_part(c.read.moves[i - 1].to + t * (c.read.moves[i].to - c.read.moves[i - 1].to));
       const auto wanted = reference.at(e.segment, e.from_share + t * (e.to_share - e.from_share));
       tip = std::max(tip, (out.tip - wanted.tip).norm());
       axis = std::max(axis, angle_between(out.axis, wanted.axis));
@@ -111,7 +113,8 @@ TEST_CASE("convert: the certified deviation bounds an independent dense comparis
   CHECK(degrees_from_radians(axis) <= find(c, "axis_deviation").value);
 }
 
-TEST_CASE("verify: a program that was changed after planning is not certified", "[postproc][pipeline]") {
+TEST_CASE("verify: a program that was changed after planning is not certified",
+          "[postproc][pipeline]") {
   const auto in = prepare(kMill, "table_table_ac", "table_table_bc");
   const Conversion c = convert(in, false, {});
   REQUIRE(c.verdict == Verdict::certified);
@@ -125,7 +128,8 @@ TEST_CASE("verify: a program that was changed after planning is not certified", 
   }
   const auto failed = [&](const ReadBack& read) {
     std::string names;
-    for (const auto& check : verify_deviation(read, in.machine, {reference, c.line_map, planned, chain}, {}))
+    for (const auto& check :
+         verify_deviation(read, in.machine, {reference, c.line_map, planned, chain}, {}))
       if (!check.ok) names += check.name + " ";
     return names;
   };
@@ -151,7 +155,8 @@ TEST_CASE("verify: a program that was changed after planning is not certified", 
   CHECK(failed(doubled).find("path_complete") != std::string::npos);
 }
 
-TEST_CASE("verify_machine: position and planned velocity limits, by definition", "[postproc][pipeline]") {
+TEST_CASE("verify_machine: position and planned velocity limits, by definition",
+          "[postproc][pipeline]") {
   const auto machine = shipped_machine("table_table_bc");
   ReadBack read;
   read.offset_guard = read.exact_path = true;
@@ -185,7 +190,8 @@ TEST_CASE("verify_machine: position and planned velocity limits, by definition",
   CHECK_FALSE(verdict("position_limit.X"));
 }
 
-TEST_CASE("beam rules: each one fails on its own fault and none can be forced", "[postproc][pipeline]") {
+TEST_CASE("beam rules: each one fails on its own fault and none can be forced",
+          "[postproc][pipeline]") {
   struct Fault {
     const char* rule;
     std::string body;
@@ -193,11 +199,12 @@ TEST_CASE("beam rules: each one fails on its own fault and none can be forced", 
   const std::vector<Fault> faults = {
       {"beam_off_in_rapid", "G0 Z1\nM62 P0\nG1 X10 F1000\nG0 X20\nM63 P0\n"},
       {"beam_dwell", "G0 Z1\nM62 P0\nG1 X10 F1000\nG4 P0.5\nG1 X20\nM63 P0\n"},
-      {"beam_off_at_start_and_end", "G0 Z1\nM62 P0\nG1 X10 F1000\nM63 P0\nG1 X20\nM62 P0\nG1 X30\n"}};
+      {"beam_off_at_start_and_end",
+       "G0 Z1\nM62 P0\nG1 X10 F1000\nM63 P0\nG1 X20\nM62 P0\nG1 X30\n"}};
   for (const auto& fault : faults) {
     const bool ends_on = std::string(fault.rule) == "beam_off_at_start_and_end";
-    auto in = prepare(kLaserHead + fault.body + (ends_on ? "M429\nM30\n%\n" : kLaserEnd), "laser_5p1",
-                      "laser_5p1");
+    auto in = prepare(kLaserHead + fault.body + (ends_on ? "M429\nM30\n%\n" : kLaserEnd),
+                      "laser_5p1", "laser_5p1");
     in.placement = at(700, 600, 1000);
     for (const bool force : {false, true}) {
       const Conversion c = convert(in, force, {});
@@ -241,11 +248,13 @@ TEST_CASE("interpret: missing tool length and unmapped M words are refused at th
   REQUIRE_FALSE(no_length.ok());
   bool named = false;
   for (const auto& d : no_length.diagnostics())
-    if (d.severity == Severity::error && d.where.line == 8 && d.text.find("--tool 1=") != std::string::npos)
+    if (d.severity == Severity::error && d.where.line == 8 &&
+        d.text.find("--tool 1=") != std::string::npos)
       named = true;
   CHECK(named);
 
-  const auto unmapped = interpret_nc("%\nG21 G90\nG0 X0 Y0 Z0 A0 C0\nM123\nM30\n%\n", posted_for("table_table_ac"));
+  const auto unmapped =
+      interpret_nc("%\nG21 G90\nG0 X0 Y0 Z0 A0 C0\nM123\nM30\n%\n", posted_for("table_table_ac"));
   REQUIRE_FALSE(unmapped.ok());
   CHECK(has_code(unmapped.diagnostics(), "PR101"));
 }
@@ -270,9 +279,10 @@ TEST_CASE("interpret: the part's frame is the program's zero whatever the work o
   REQUIRE(plain.ok());
   REQUIRE(moved.ok());
   for (std::size_t i = 0; i < plain.value().path.points.size(); ++i)
-    CHECK((plain.value().path.points[i].location.tip - moved.value().path.points[i].location.tip).norm() < 1e-12);
-  // Outside TCP mode the same offset decides where the part lies on the input machine: a turn of the table
-  // then moves the tip, seen from the part.
+    CHECK((plain.value().path.points[i].location.tip - moved.value().path.points[i].location.tip)
+              .norm() < 1e-12);
+  // Outside TCP mode the same offset decides where the part lies on the input machine: a turn of
+  // the table then moves the tip, seen from the part.
   const std::string joints = "%\nG21 G90\nG54\nG0 X0 Y0 Z0 A0 C90\nG1 X4 F100\nM30\n%\n";
   const auto turned = interpret_nc(joints, settings);
   REQUIRE(turned.ok());
@@ -283,11 +293,13 @@ TEST_CASE("interpret: the part's frame is the program's zero whatever the work o
 
 TEST_CASE("interpret: G49 after G43, G53 and an unknown start", "[postproc][pipeline]") {
   const auto settings = posted_for("table_table_ac");
-  const auto unknown = interpret_nc("%\nM428\nG21 G90\nG0 X0 A0 C0\nG1 Y1 Z0 F100\nM30\n%\n", settings);
+  const auto unknown =
+      interpret_nc("%\nM428\nG21 G90\nG0 X0 A0 C0\nG1 Y1 Z0 F100\nM30\n%\n", settings);
   REQUIRE_FALSE(unknown.ok());
   CHECK(has_code(unknown.diagnostics(), "NC313"));
   // A second work system whose place was not given is refused.
-  const auto second = interpret_nc("%\nM428\nG21 G90\nG54\nG0 X0 Y0 Z0 A0 C0\nG55\nG1 X1 F100\nM30\n%\n", settings);
+  const auto second =
+      interpret_nc("%\nM428\nG21 G90\nG54\nG0 X0 Y0 Z0 A0 C0\nG55\nG1 X1 F100\nM30\n%\n", settings);
   REQUIRE_FALSE(second.ok());
   CHECK(has_code(second.diagnostics(), "PR301"));
 }
@@ -296,8 +308,8 @@ TEST_CASE("convert: positions of the input machine in mid program become links o
           "[postproc][pipeline]") {
   // G53 and G28 go to places of the A/C machine that mean nothing on the B/C machine.
   for (const char* away : {"G53 G0 Z50", "G28 Z60"}) {
-    const auto in = prepare(std::string("%\nM428\nG21 G90 G94\nG0 X0 Y0 Z20 A0 C0\nG1 X10 F500\n") + away +
-                                "\nG0 X5 Y5 Z20 A-30 C10\nG1 X15 F500\nG0 Z60\nM30\n%\n",
+    const auto in = prepare(std::string("%\nM428\nG21 G90 G94\nG0 X0 Y0 Z20 A0 C0\nG1 X10 F500\n") +
+                                away + "\nG0 X5 Y5 Z20 A-30 C10\nG1 X15 F500\nG0 Z60\nM30\n%\n",
                             "table_table_ac", "table_table_bc");
     const Conversion c = convert(in, false, {});
     INFO(away);
@@ -323,9 +335,10 @@ TEST_CASE("convert: positions of the input machine in mid program become links o
 TEST_CASE("convert: tools of different length", "[postproc][pipeline]") {
   auto settings = posted_for("table_table_ac");
   settings.tool_lengths = {{1, 60.0}, {2, 85.5}};
-  auto read = interpret_nc("%\nM428\nG21 G90 G94\nT1 M6\nG43 H1\nG0 X0 Y0 Z20 A0 C0\nG1 X10 F500\nG0 Z40\n"
-                           "T2 M6\nG43 H2\nG0 X0 Y0 Z20\nG1 X10 A-30 F500\nG0 Z60\nM30\n%\n",
-                           settings);
+  auto read = interpret_nc(
+      "%\nM428\nG21 G90 G94\nT1 M6\nG43 H1\nG0 X0 Y0 Z20 A0 C0\nG1 X10 F500\nG0 Z40\n"
+      "T2 M6\nG43 H2\nG0 X0 Y0 Z20\nG1 X10 A-30 F500\nG0 Z60\nM30\n%\n",
+      settings);
   for (const auto& d : read.diagnostics()) UNSCOPED_INFO(to_string(d));
   REQUIRE(read.ok());
   ConvertInput in;
@@ -358,7 +371,8 @@ TEST_CASE("convert: cancelling never leaves a certificate", "[postproc][pipeline
   }
 }
 
-TEST_CASE("convert: out of the machine's range is named with line and limit", "[postproc][pipeline]") {
+TEST_CASE("convert: out of the machine's range is named with line and limit",
+          "[postproc][pipeline]") {
   auto in = prepare(kLaserHead + "G1 X10 F1000\n" + kLaserEnd, "laser_5p1", "laser_5p1");
   in.placement = at(-100, 600, 1000);
   const Conversion c = convert(in, false, {});
@@ -367,9 +381,10 @@ TEST_CASE("convert: out of the machine's range is named with line and limit", "[
 }
 
 TEST_CASE("convert: the pole is crossed without a swing", "[postproc][pipeline]") {
-  // B goes through 0 at constant C in the input: the same on the output, not a turn of C by 180 degrees.
-  auto in = prepare(kLaserHead + "G0 X0 Y0 Z1 B-20 C30\nG1 X50 B20 F1000\n" + kLaserEnd, "laser_5p1",
-                    "laser_5p1");
+  // B goes through 0 at constant C in the input: the same on the output, not a turn of C by 180
+  // degrees.
+  auto in = prepare(kLaserHead + "G0 X0 Y0 Z1 B-20 C30\nG1 X50 B20 F1000\n" + kLaserEnd,
+                    "laser_5p1", "laser_5p1");
   in.placement = at(700, 600, 1000);
   const Conversion c = convert(in, false, {});
   for (const auto& d : c.diagnostics) UNSCOPED_INFO(to_string(d));
@@ -379,17 +394,20 @@ TEST_CASE("convert: the pole is crossed without a swing", "[postproc][pipeline]"
       CHECK(std::abs(std::remainder(c.read.moves[i].to[3] - radians_from_degrees(30), kPi)) < 1e-6);
 }
 
-TEST_CASE("convert: a turn at the pole stays inside the tolerances on a table", "[postproc][pipeline]") {
+TEST_CASE("convert: a turn at the pole stays inside the tolerances on a table",
+          "[postproc][pipeline]") {
   // A 3-axis part, then a tilt in a direction that the C table has to turn to, all while cutting.
-  const auto in = prepare("%\nM428\nG21 G90 G94\nG0 X30 Y0 Z20 A0 C0\nG1 Z0 F500\nG1 X-30\n"
-                          "G1 Y5 A-30 C0\nG1 X0 A-30 C40\nG1 X5 A0\nG0 Z30\nM30\n%\n",
-                          "table_table_ac", "table_table_bc");
+  const auto in = prepare(
+      "%\nM428\nG21 G90 G94\nG0 X30 Y0 Z20 A0 C0\nG1 Z0 F500\nG1 X-30\n"
+      "G1 Y5 A-30 C0\nG1 X0 A-30 C40\nG1 X5 A0\nG0 Z30\nM30\n%\n",
+      "table_table_ac", "table_table_bc");
   const Conversion c = convert(in, false, {});
   for (const auto& d : c.diagnostics) UNSCOPED_INFO(to_string(d));
   CHECK(c.verdict == Verdict::certified);
 }
 
-TEST_CASE("convert: a C axis that winds past its limit is reported with its line", "[postproc][pipeline]") {
+TEST_CASE("convert: a C axis that winds past its limit is reported with its line",
+          "[postproc][pipeline]") {
   std::string body = "G0 X0 Y0 Z1 B30 C0\n";
   for (int turn = 1; turn <= 5; ++turn)
     body += "G1 X" + std::to_string(turn * 5) + " C" + std::to_string(turn * 180) + " F1000\n";
@@ -408,7 +426,8 @@ TEST_CASE("convert: a C axis that winds past its limit is reported with its line
     if (d.code == "KN103") CHECK(d.where.line >= 9);
 }
 
-TEST_CASE("trajectory_csv: joints and tip at the cycle, linear in the printed time", "[postproc][pipeline]") {
+TEST_CASE("trajectory_csv: joints and tip at the cycle, linear in the printed time",
+          "[postproc][pipeline]") {
   auto in = prepare(kLaserHead + "G0 Z1\nG1 X10 F600\n" + kLaserEnd, "laser_5p1", "laser_5p1");
   in.placement = at(700, 600, 1000);
   const Conversion c = convert(in, false, {});

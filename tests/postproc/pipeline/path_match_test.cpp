@@ -12,7 +12,8 @@ using namespace smoothpost::test;
 namespace {
 
 const std::string kProgram =
-    "%\nM428\nG21 G90 G94\nG0 X0 Y0 Z20 A0 C0\nG0 Z1\nG1 X8 F600\nG1 X8 Y5\nG1 X0 Y5 A-20 C10\nG1 X-3 Y1 A-25 "
+    "%\nM428\nG21 G90 G94\nG0 X0 Y0 Z20 A0 C0\nG0 Z1\nG1 X8 F600\nG1 X8 Y5\nG1 X0 Y5 A-20 C10\nG1 "
+    "X-3 Y1 A-25 "
     "C0\nG0 Z20\nG53 G0 Z60\nG0 X5 Y5 Z10 A-10 C5\nG1 X9 F600\nG0 Z30\nM30\n%\n";
 
 struct Fixture {
@@ -34,13 +35,15 @@ struct Fixture {
 
   PathMatch match(const ReadBack& read) const {
     const ReferencePath reference(in.input.path, in.input.frames);
-    return match_paths(read, chain, reference, {in.machine.tolerance.tip, in.machine.tolerance.axis}, {});
+    return match_paths(read, chain, reference,
+                       {in.machine.tolerance.tip, in.machine.tolerance.axis}, {});
   }
 
   /// The first motion of the output that ends the given input line.
   std::size_t end_of_line(std::uint32_t line) const {
     for (std::size_t i = 0; i < conversion.line_map.size(); ++i)
-      if (conversion.line_map[i].input_line == line && conversion.line_map[i].to_share == 1.0) return i;
+      if (conversion.line_map[i].input_line == line && conversion.line_map[i].to_share == 1.0)
+        return i;
     FAIL("no such line");
     return 0;
   }
@@ -48,7 +51,8 @@ struct Fixture {
 
 }  // namespace
 
-TEST_CASE("match_paths: a certified program matches its input without the map", "[postproc][pipeline]") {
+TEST_CASE("match_paths: a certified program matches its input without the map",
+          "[postproc][pipeline]") {
   const Fixture f;
   const PathMatch match = f.match(f.conversion.read);
   INFO(match.reason << " at input " << match.input_line << ", output " << match.output_line);
@@ -56,7 +60,8 @@ TEST_CASE("match_paths: a certified program matches its input without the map", 
   CHECK(match.share <= 1.0);
 }
 
-TEST_CASE("match_paths: dropped, doubled, exchanged and shifted blocks are found", "[postproc][pipeline]") {
+TEST_CASE("match_paths: dropped, doubled, exchanged and shifted blocks are found",
+          "[postproc][pipeline]") {
   const Fixture f;
   const auto& moves = f.conversion.read.moves;
   const std::size_t corner = f.end_of_line(7);  // the corner at X8 Y5
@@ -77,7 +82,8 @@ TEST_CASE("match_paths: dropped, doubled, exchanged and shifted blocks are found
     ReadBack shifted = f.conversion.read;
     shifted.moves[corner].to[joint] += joint < 3 ? 0.02 : radians_from_degrees(0.1);
     INFO("joint " << joint);
-    // C turns about the tool axis while the table is level: what it moves is the tip, 8 mm off the centre.
+    // C turns about the tool axis while the table is level: what it moves is the tip, 8 mm off the
+    // centre.
     CHECK_FALSE(f.match(shifted).matched);
   }
 }

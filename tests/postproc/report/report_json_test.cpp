@@ -30,14 +30,17 @@ bool contains(const std::string& text, const std::string& part) {
 
 }  // namespace
 
-TEST_CASE("report_json: keys of schema 1, nine digits, stages only with timings", "[postproc][report]") {
+TEST_CASE("report_json: keys of schema 1, nine digits, stages only with timings",
+          "[postproc][report]") {
   ReportContext context;
   context.machine = "m";
   const std::string text = report_json(sample(), context);
-  for (const char* key : {"\"schema\": 1", "\"tool\"", "\"machine\": \"m\"", "\"dialect\"", "\"verdict\": \"certified\"",
-                          "\"level\": \"geometry\"", "\"assumes\"", "\"not_checked\"", "\"budget_mm\"",
-                          "\"input_sha256\"", "\"cutter_locations\"", "\"length_mm\"", "\"checks\"", "\"axes\"",
-                          "\"time_s\"", "\"diagnostics\"", "\"value\": 0.00123456789", "\"input_line\": 7"})
+  for (const char* key :
+       {"\"schema\": 1", "\"tool\"", "\"machine\": \"m\"", "\"dialect\"",
+        "\"verdict\": \"certified\"", "\"level\": \"geometry\"", "\"assumes\"", "\"not_checked\"",
+        "\"budget_mm\"", "\"input_sha256\"", "\"cutter_locations\"", "\"length_mm\"", "\"checks\"",
+        "\"axes\"", "\"time_s\"", "\"diagnostics\"", "\"value\": 0.00123456789",
+        "\"input_line\": 7"})
     CHECK(contains(text, key));
   CHECK_FALSE(contains(text, "stages"));
   CHECK_FALSE(contains(text, "0.0012345678901"));
@@ -79,7 +82,8 @@ TEST_CASE("changed_checks: verdicts, values, new and absent checks", "[postproc]
 }
 
 TEST_CASE("line_map_json: one row a motion", "[postproc][report]") {
-  const std::string text = line_map_json({{12, 3, MoveRole::path, 2, 0.25, 1.0}, {13, 0, MoveRole::link, 0, 0, 1}}, "a\"b");
+  const std::string text = line_map_json(
+      {{12, 3, MoveRole::path, 2, 0.25, 1.0}, {13, 0, MoveRole::link, 0, 0, 1}}, "a\"b");
   CHECK(contains(text, "[12,3,\"path\",2,0.25,1]"));
   CHECK(contains(text, "[13,0,\"link\",0,0,1]"));
   CHECK(contains(text, "\"a\\\"b\""));

@@ -1,0 +1,154 @@
+// Real programs of others, where the shared corpus lies beside the checkout.
+
+#include <catch2/catch.hpp>
+#include <map>
+
+#include "kernels/core/units.h"
+#include "postproc/pipeline/convert.h"
+#include "tests/support/machines.h"
+
+using namespace smoothpost;
+using namespace smoothpost::test;
+
+namespace {
+
+const std::string kDemos =
+    "corpus/1_five_axis/LinuxCNC/configs/sim/axis/vismach/5axis/table-rotary-tilting/demos/";
+
+std::optional<InterpretedInput> boat(const char* name, const char* machine) {
+  const auto path = shared_path(kDemos + name);
+  if (!path) return {};
+  InputSettings settings;
+  settings.file_name = name;
+  settings.machine = shipped_machine(machine);
+  settings.tool_lengths = {{1, 50.0}};
+  auto read = interpret_nc(read_bytes(*path), settings);
+  for (const auto& d : read.diagnostics()) UNSCOPED_INFO(to_string(d));
+  REQUIRE(read.ok());
+  return std::move(read.value());
+}
+
+Conversion to_bc(InterpretedInput input, const char* name) {
+  ConvertInput in;
+  in.input = std::move(input);
+  in.machine = shipped_machine("table_table_bc");
+  in.input_name = name;
+  return convert(in, false, {});
+}
+
+/// Cutting points of a path, every 0.2 mm at most, in a grid of 1 mm cells.
+struct Cloud {
+  std::vector<CutterLocation> points;
+  std::map<std::array<int, 3>, std::vector<std::size_t>> cells;
+
+  static std::array<int, 3> cell(const Vec3& p) {
+    return {static_cast<int>(std::floor(p.x())), static_cast<int>(std::floor(p.y())),
+            static_cast<int>(std::floor(p.z()))};
+  }
+
+  explicit Cloud(const InterpretedInput& input, double step) {
+    const ReferencePath path(input.path, input.frames);
+    for (std::size_t k = 1; k <= path.segments(); ++k) {
+      if (input.path.points[k].kind != MotionKind::feed) continue;
+      const int n = std::max(1, static_cast<int>(std::ceil(path.length(k) / step)));
+      for (int i = 0; i <= n; ++i) points.push_back(path.at(k, static_cast<double>(i) / n));
+    }
+    for (std::size_t i = 0; i < points.size(); ++i) cells[cell(points[i].tip)].push_back(i);
+  }
+
+  /// Smallest distance of tip (mm) plus axis (degrees / 10) to a point of the cloud, and that
+  /// point.
+  std::pair<double, std::size_t> nearest(const CutterLocation& l) const {
+    std::pair<double, std::size_t> best{1e9, 0};
+    const auto c = cell(l.tip);
+    for (int x = -1; x <= 1; ++x)
+      for (int y = -1; y <= 1; ++y)
+        for (int z = -1; z <= 1; ++z) {
+          const auto found = cells.find({c[0] + x, c[1] + y, c[2] + z});
+          if (found == cells.end()) continue;
+          for (const std::size_t i : found->second) {
+            const double d = (points[i].tip - l.tip).norm() +
+                             0.1 * degrees_from_radians(angle_between(points[i].axis, l.axis));
+            if (d < best.first) best = {d, i};
+          }
+        }
+    return best;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("corpus: both boat programs are certified on the B/C table",
+          "[postproc][pipeline][corpus]") {
+  for (const auto& [name, machine] :
+       {std::pair{"boat-xyzac.ngc", "table_table_ac"}, {"boat-xyzbc.ngc", "table_table_bc"}}) {
+    auto input = boat(name, machine);
+    if (!input) {
+      WARN("no corpus: skipped");
+      return;
+    }
+    const Conversion c = to_bc(std::move(*input), name);
+    for (const auto& d : c.diagnostics) UNSCOPED_INFO(to_string(d));
+    CHECK(c.verdict == Verdict::certified);
+  }
+}
+
+TEST_CASE("corpus: the boat posted for A/C and for B/C is one tool path",
+          "[postproc][pipeline][corpus]") {
+  const auto ac = boat("boat-xyzac.ngc", "table_table_ac");
+  const auto bc = boat("boat-xyzbc.ngc", "table_table_bc");
+  if (!ac || !bc) {
+    WARN("no corpus: skipped");
+    return;
+  }
+  // Finely sampled, so that the nearest sample is near the nearest point of the path.
+  const Cloud reference(*ac, 0.02);
+  const Cloud other(*bc, 0.5);
+  std::vector<double> tips, axes;
+  for (const auto& l : other.points) {
+    const auto [d, i] = reference.nearest(l);
+    if (d > 0.1) continue;  // passes that only the B/C program has
+    tips.push_back((reference.points[i].tip - l.tip).norm());
+    axes.push_back(degrees_from_radians(angle_between(reference.points[i].axis, l.axis)));
+  }
+  std::sort(tips.begin(), tips.end());
+  std::sort(axes.begin(), axes.end());
+  const double share = static_cast<double>(tips.size()) / static_cast<double>(other.points.size());
+  WARN("boat A/C against B/C: " << 100 * share
+                                << " % of the B/C path lies on the A/C path; there tip median "
+                                << tips[tips.size() / 2] << " mm (samples every 0.02), axis median "
+                                << axes[axes.size() / 2] << " deg, 99 % "
+                                << axes[axes.size() * 99 / 100] << " deg");
+  CHECK(share > 0.9);
+  CHECK(tips[tips.size() / 2] < 0.011);
+  CHECK(axes[axes.size() * 99 / 100] < 0.1);
+}
+
+TEST_CASE("corpus: the 34,000 line B/C program of a printer", "[postproc][pipeline][corpus]") {
+  const auto path = shared_path("corpus/1_five_axis/zhangty019/DataSet/Gcode/model_1_Gcode.txt.gz");
+  if (!path) {
+    WARN("no corpus: skipped");
+    return;
+  }
+  InputSettings settings;
+  settings.file_name = "model_1_Gcode.txt";
+  settings.machine = shipped_machine("table_table_bc");
+  const std::string text = read_bytes(*path);
+  const auto refused = interpret_nc(text, settings);
+  REQUIRE_FALSE(refused.ok());
+  CHECK(refused.diagnostics().front().code == "PR101");
+  CHECK(refused.diagnostics().front().where.line == 2);
+
+  settings.process = settings.machine->process;
+  settings.process->unmapped = UnmappedWords::comment;
+  auto read = interpret_nc(text, settings);
+  REQUIRE(read.ok());
+  const bool stated = std::any_of(
+      read.value().assumes.begin(), read.value().assumes.end(),
+      [](const std::string& a) { return a.find("without a mapping") != std::string::npos; });
+  CHECK(stated);
+  const Conversion c = to_bc(std::move(read.value()), "model_1_Gcode.txt");
+  for (const auto& d : c.diagnostics) UNSCOPED_INFO(to_string(d));
+  CHECK(c.verdict == Verdict::certified);
+  CHECK(c.blocks > 34000);
+}
