@@ -59,7 +59,8 @@ std::vector<double> move_times(const ReadBack& read, const MachineDefinition& ma
 class Worst {
  public:
   void see(double value, std::uint32_t output_line, double time, std::uint32_t input_line = 0) {
-    if (seen_ && value <= value_) return;
+    // What is not a number stays: it must fail, never be passed over.
+    if (seen_ && (std::isnan(value_) || value <= value_)) return;
     seen_ = true;
     value_ = value;
     output_line_ = output_line;
@@ -221,7 +222,10 @@ class DeviationCheck {
     check_map();
     if (broken_.empty()) {
       for (std::size_t i = 0; i < read_.moves.size(); ++i) {
-        if (in_.map[i].role == MoveRole::path) compare_block(i);
+        if (in_.map[i].role == MoveRole::path) {
+          compare_block(i);
+          compare_beam(i);
+        }
         compare_joints(i);
         if (i % 4096 == 0 &&
             !progress("verify", static_cast<double>(i) / static_cast<double>(read_.moves.size()))) {
@@ -233,6 +237,9 @@ class DeviationCheck {
       checks.push_back(
           axis_.check("axis_deviation", degrees_from_radians(machine_.tolerance.axis), "deg"));
       add_round_trip(checks);
+      if (has_beam(machine_))
+        checks.push_back(rule("beam_as_programmed", wrong_beam_, "moves", wrong_beam_line_,
+                              "the beam is on where the input has it off, or off where it is on"));
     }
     if (has_beam(machine_)) check_beam_in_links(checks);
     Check complete;
@@ -309,6 +316,12 @@ class DeviationCheck {
     }
   }
 
+  void compare_beam(std::size_t i) {
+    if (read_.moves[i].beam == in_.reference.path().points[in_.map[i].segment].beam) return;
+    wrong_beam_ += 1.0;
+    if (wrong_beam_line_ == 0) wrong_beam_line_ = read_.moves[i].line;
+  }
+
   // So many that the allowance between samples is at most a fiftieth of the tolerance.
   int steps_for(double tip_bend, double axis_bend) const {
     const double share = std::max(tip_bend / (0.02 * 8.0 * machine_.tolerance.tip),
@@ -357,6 +370,8 @@ class DeviationCheck {
   std::vector<double> times_;
   Worst tip_, axis_;
   std::array<Worst, kMaxJoints> joints_;
+  double wrong_beam_ = 0.0;
+  std::uint32_t wrong_beam_line_ = 0;
   std::string broken_;
   std::uint32_t broken_line_ = 0;
 };

@@ -11,7 +11,9 @@ interpreter_only stop after 2)
   4. the executed poses and the program agree: tip 0.01 mm, axis 0.05 deg, blending included; every
      row of the trajectory CSV was executed; its tips and axes are those of our forward kinematics,
   5. digital output 0 (the beam) is where the program wants it, never on in a rapid, off at the end,
-  6. with a live G54 offset in the controller the program aborts before any joint has moved.
+  6. with a live G54 offset in the controller the program aborts before any joint has moved,
+  7. where LinuxCNC has the input machine's kinematics, the input itself runs there in tool-centre-point
+     mode, and what the two machines executed is the same path within the tolerances.
 Prints every figure. Exit status: 0 all hold, 1 not, 2 usage, 77 LinuxCNC cannot run here (and why).
 """
 import argparse
@@ -23,8 +25,8 @@ import sys
 import numpy as np
 
 import interpreter_check
-from compare_path import (Comparison, Log, Plan, Trajectory, block_of_samples, compare,
-                          compare_trajectory)
+from compare_path import (Comparison, Deviation, Log, Plan, Trajectory, block_of_samples, compare,
+                          compare_trajectory, nearest)
 from joint_program import JointProgram
 from machine_model import Machine, axis_angle_deg, fail
 from make_config import write_config
@@ -39,7 +41,7 @@ SAMPLES = "tests/acceptance/linuxcnc/samples"
 # The mills' home is far above the work; it is moved near, to keep the runs to seconds.
 MILL = {"input": f"{SAMPLES}/mill_short.ngc", "input_machine": "table_table_ac",
         "options": ["--tool", "1=50"], "tool_length": 50.0,
-        "set": {"axis.Z.home": 150, "links.retract_mm": 150}}
+        "set": {"axis.Z.home": 150, "links.retract_mm": 150}, "native": True}
 CASES = {
     "mill_to_table_table_ac": {**MILL, "machine": "table_table_ac"},
     "mill_to_table_table_bc": {**MILL, "machine": "table_table_bc"},
@@ -192,6 +194,36 @@ class Acceptance:
         if "beam_on" in self.machine.events:
             self.that(bool(np.any(on)), f"output 0 is on for {np.count_nonzero(on)} ms")
 
+    def native(self):
+        """The input program in LinuxCNC's own kinematics against the executed output program."""
+        machine = Machine(self.machine_file(self.case["input_machine"]))
+        for axis in machine.axes:
+            axis.home = self.case["set"].get(f"axis.{axis.name}.home", axis.home)
+        config, program, path = (os.path.join(self.work, name)
+                                 for name in ("config_native", "native.ngc", "log_native.txt"))
+        with open(os.path.join(self.source, self.case["input"]), encoding="ascii") as file:
+            text = file.read()
+        with open(program, "w", encoding="ascii") as file:
+            file.write(text.replace("T1 M6", "G61\nT1 M6"))  # the input as written, not blended
+        write_config(machine, config, "trt", tools={1: self.case["tool_length"]})
+        status = run_program(config, program, path, timeout=90.0)
+        if not self.that(status == 0, f"the input in LinuxCNC's own kinematics: status {status}"):
+            return
+        weight = TOLERANCE[0] / np.radians(TOLERANCE[1])
+        sides = []
+        for side, log in ((machine, Log(path, machine)),
+                          (self.machine, Log(os.path.join(self.work, "log_plain.txt"), self.machine))):
+            feed = side.poses(log.joints[log.motion_type >= 2], self.case["tool_length"], weight)
+            moved = np.linalg.norm(np.diff(feed, axis=0), axis=1) > 0.0
+            sides.append(feed[np.r_[True, moved]])
+        for here, there, name in ((*sides, "input to output"), (*sides[::-1], "output to input")):
+            deviation = Deviation(weight)
+            some = here[::10]
+            _, feet = nearest(some, there[:-1], there[1:])
+            deviation.add(some, feet, range(len(some)))
+            self.that(deviation.tip <= TOLERANCE[0] and deviation.axis <= TOLERANCE[1],
+                      f"executed {name}: tip {deviation.tip:.5f} mm, axis {deviation.axis:.5f} deg")
+
     def guard(self):
         for letter in (self.machine.letters[0], self.machine.letters[-1]):
             status, path = self.run(f"g54_{letter}", g54={letter: LIVE_OFFSET})
@@ -219,6 +251,8 @@ def main():
         if not acceptance.case.get("interpreter_only"):
             acceptance.execution()
             acceptance.guard()
+        if acceptance.case.get("native"):
+            acceptance.native()
     print(f"{arguments.case}: "
           f"{f'{len(verdicts.failed)} checks FAILED' if verdicts.failed else 'accepted'}")
     sys.exit(1 if verdicts.failed else 0)

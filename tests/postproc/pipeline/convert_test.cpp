@@ -222,6 +222,56 @@ TEST_CASE("beam rules: each one fails on its own fault and none can be forced",
   CHECK(c.verdict == Verdict::certified);
 }
 
+TEST_CASE("verify: a beam that is not where the input has it is found", "[postproc][pipeline]") {
+  auto in = prepare(kLaserHead + "G0 Z1\nM62 P0\nG1 X10 F1000\nM63 P0\n" + kLaserEnd, "laser_5p1",
+                    "laser_5p1");
+  in.placement = at(700, 600, 1000);
+  const Conversion c = convert(in, false, {});
+  REQUIRE(c.verdict == Verdict::certified);
+  const ReferencePath reference(in.input.path, in.input.frames);
+  ScrewChain chain = chain_of(in.machine);
+  chain.workpiece_home = chain.workpiece_home * in.placement;
+  MachineProgram planned;
+  for (const auto& move : c.read.moves) {
+    MachineMove m;
+    m.to = move.to;
+    planned.moves.push_back(m);
+  }
+  for (std::size_t i = 0; i < c.read.moves.size(); ++i) {
+    if (c.line_map[i].role != MoveRole::path) continue;
+    ReadBack read = c.read;
+    read.moves[i].beam = !read.moves[i].beam;
+    bool found = false;
+    for (const auto& check :
+         verify_deviation(read, in.machine, {reference, c.line_map, planned, chain}, {}))
+      if (check.name == "beam_as_programmed") found = !check.ok;
+    CHECK(found);
+  }
+}
+
+TEST_CASE("verify: a joint that is not a number is never certified", "[postproc][pipeline]") {
+  const auto in = prepare(kMill, "table_table_ac", "table_table_bc");
+  const Conversion c = convert(in, false, {});
+  const ReferencePath reference(in.input.path, in.input.frames);
+  const ScrewChain chain = chain_of(in.machine);
+  MachineProgram planned;
+  for (const auto& move : c.read.moves) {
+    MachineMove m;
+    m.to = move.to;
+    planned.moves.push_back(m);
+  }
+  ReadBack read = c.read;
+  read.moves[30].to[1] = std::nan("");
+  bool failed = false;
+  for (const auto& check :
+       verify_deviation(read, in.machine, {reference, c.line_map, planned, chain}, {}))
+    failed = failed || !check.ok;
+  CHECK(failed);
+  failed = false;
+  for (const auto& check : verify_machine(read, in.machine).checks) failed = failed || !check.ok;
+  CHECK(failed);
+}
+
 TEST_CASE("convert: spindle words cannot reach a laser", "[postproc][pipeline]") {
   auto in = prepare(kMill, "table_table_ac", "laser_5p1");
   in.placement = at(700, 600, 1000);
