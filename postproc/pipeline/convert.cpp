@@ -137,10 +137,15 @@ void describe_input(const InterpretedInput& input, const ReferencePath& referenc
   bool in_link = false;
   for (std::size_t k = 1; k < input.path.points.size(); ++k) {
     const PathPoint& p = input.path.points[k];
+    const double length = reference.length(k);
     out.programmed_time += p.duration;
-    out.length += reference.length(k);
+    out.length += length;
     const bool cut = p.kind == MotionKind::feed;
-    if (cut && !in_cut) ++out.cuts;
+    if (cut && !in_cut) out.cuts.push_back({p.line, p.line, 0.0});
+    if (cut) {
+      out.cuts.back().last_line = p.line;
+      out.cuts.back().length += length;
+    }
     if (!cut && !in_link) ++out.links;
     in_cut = cut;
     in_link = !cut;
@@ -215,8 +220,12 @@ class Converter {
     watch_.lap("interpret");
     if (!recipe_is_possible()) return finish(false);
     if (beam_part && !register_input()) return finish(false);
-    if (in_.part && !uses_beam())
-      out_.not_checked.push_back("part_registration and gap: the program has no beam-on motion");
+    if (in_.part && !uses_beam()) {
+      out_.diagnostics.push_back(diagnostic(
+          "RG120", "the program has no beam-on motion: it was not compared with the part",
+          in_.part_name));
+      out_.diagnostics.back().severity = Severity::note;
+    }
     const bool made = plan() && emit() && verify();
     return finish(made);
   }

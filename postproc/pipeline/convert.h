@@ -28,6 +28,13 @@ struct ConvertInput {
 enum class Verdict { certified, limits_only, refused, forced };
 std::string to_string(Verdict verdict);
 
+/// A run of feed motions of the input.
+struct CutSummary {
+  std::uint32_t first_line = 0;
+  std::uint32_t last_line = 0;
+  double length = 0.0;  ///< mm, of the tip
+};
+
 struct StageTime {
   std::string name;
   double seconds = 0.0;
@@ -51,7 +58,7 @@ struct Conversion {
   double programmed_time = 0.0;
   double scheduled_time = 0.0;
   double length = 0.0;  ///< mm, of the tip
-  std::size_t cuts = 0;
+  std::vector<CutSummary> cuts;
   std::size_t links = 0;
   std::size_t blocks = 0;
   std::vector<StageTime> stages;

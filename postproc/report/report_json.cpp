@@ -53,7 +53,11 @@ Json axis_json(const AxisSummary& a) {
            {{"velocity", number(a.limit_velocity)},
             {"acceleration", number(a.limit_acceleration)},
             {"jerk", number(a.limit_jerk)},
-            {"source", a.source}}}};
+            {"source", a.source}}},
+          {"input_peak", nullptr},
+          {"rms_jerk", nullptr},
+          {"input_rms_jerk", nullptr},
+          {"rounding_jerk", nullptr}};
 }
 
 std::string dump(const Json& json) {
@@ -95,7 +99,7 @@ std::string report_json(const Conversion& c, const ReportContext& context) {
                 {"format", context.input_format},
                 {"dialect", context.input_dialect},
                 {"lines", context.input_lines},
-                {"cuts", c.cuts},
+                {"cuts", c.cuts.size()},
                 {"links", c.links},
                 {"cutter_locations", context.cutter_locations},
                 {"length_mm", number(c.length)}};
@@ -104,6 +108,14 @@ std::string report_json(const Conversion& c, const ReportContext& context) {
                  {"bytes", c.program.size()}};
   j["checks"] = std::move(checks);
   j["axes"] = std::move(axes);
+  constexpr std::size_t kMostCuts = 10000;
+  Json cuts = Json::array();
+  for (std::size_t i = 0; i < std::min(c.cuts.size(), kMostCuts); ++i)
+    cuts.push_back({{"label", "cut " + std::to_string(i + 1)},
+                    {"input_lines", {c.cuts[i].first_line, c.cuts[i].last_line}},
+                    {"length_mm", number(c.cuts[i].length)}});
+  j["corners"] = Json::array();  // this version smooths none
+  j["cuts"] = std::move(cuts);
   j["time_s"] = {{"programmed", number(c.programmed_time)},
                  {"scheduled", number(c.scheduled_time)}};
   j["diagnostics"] = std::move(diagnostics);
