@@ -27,9 +27,9 @@ struct AxisDefinition {
 };
 
 struct ToolDefinition {
-  Vec3 tip = Vec3::Zero();         ///< in the last link, mm; where a tool of length 0 has its tip
-  Vec3 axis = Vec3::UnitZ();       ///< unit, from tip to holder
-  double gap = 0.0;                ///< nominal distance tip to part while the beam is on, mm
+  Vec3 tip = Vec3::Zero();    ///< in the last link, mm; where a tool of length 0 has its tip
+  Vec3 axis = Vec3::UnitZ();  ///< unit, from tip to holder
+  double gap = 0.0;           ///< nominal distance tip to part while the beam is on, mm
   double land_radius = 0.0;
   double min_gap = 0.0;
 };
@@ -54,10 +54,10 @@ struct StandoffSettings {
 
 enum class RapidMotion { linear, independent };
 struct LinkSettings {
-  double clearance = 0.0;     ///< mm along the tool axis
-  std::string retract_axis;   ///< axis name
-  double retract = 0.0;       ///< its position for a retract, mm
-  double rotation = 0.0;      ///< rad
+  double clearance = 0.0;    ///< mm along the tool axis
+  std::string retract_axis;  ///< axis name
+  double retract = 0.0;      ///< its position for a retract, mm
+  double rotation = 0.0;     ///< rad
   RapidMotion rapid = RapidMotion::linear;
   std::string rewind = "links_only";
 };
@@ -72,12 +72,13 @@ struct ToleranceBudget {
 };
 
 struct ToleranceSettings {
-  double tip = 0.01;    ///< mm
-  double axis = 0.0;    ///< rad
-  double lead = 0.0;    ///< rad
-  double tilt = 0.0;    ///< rad
+  double tip = 0.01;  ///< mm
+  double axis = 0.0;  ///< rad
+  double lead = 0.0;  ///< rad
+  double tilt = 0.0;  ///< rad
   double clearance = 0.0;
-  double limit_share = 1.0;  ///< share of the velocity, acceleration and jerk limits that we plan with
+  double limit_share =
+      1.0;  ///< share of the velocity, acceleration and jerk limits that we plan with
   ToleranceBudget budget;
 };
 
@@ -94,12 +95,12 @@ struct RecipeSettings {
 
 struct DialectSettings {
   std::string name = "linuxcnc";
-  std::string mode = "joint";   ///< joint | tcp
-  std::string units = "mm";     ///< mm | inch
+  std::string mode = "joint";  ///< joint | tcp
+  std::string units = "mm";    ///< mm | inch
   std::string extension = "ngc";
-  int digits_length = 5;        ///< decimals of lengths, in `units`
-  int digits_angle = 6;         ///< decimals of angles, in degrees
-  double block_time = 0.010;    ///< s
+  int digits_length = 5;      ///< decimals of lengths, in `units`
+  int digits_angle = 6;       ///< decimals of angles, in degrees
+  double block_time = 0.010;  ///< s
   bool line_numbers = true;
   std::vector<std::string> start;
   std::vector<std::string> end;
@@ -143,8 +144,8 @@ struct MachineDefinition {
 /// X_MT(0) has the tip as origin and the identity as rotation.
 ScrewChain chain_of(const MachineDefinition& machine, double tool_length = 0.0);
 
-/// Position range, velocity, acceleration and jerk of every axis, in machine-file order; mm or rad and s.
-/// limit_share is not applied. @pre size() ≤ kMaxJoints   @throws ContractViolation if not.
+/// Position range, velocity, acceleration and jerk of every axis, in machine-file order; mm or rad
+/// and s. limit_share is not applied. @pre size() ≤ kMaxJoints   @throws ContractViolation if not.
 JointLimits limits_of(const MachineDefinition& machine);
 
 /// Home position of every axis, in machine-file order; mm or rad.

@@ -16,8 +16,9 @@ struct MachineOverride {
   std::string value;
 };
 
-/// Reads a machine definition (docs/machine_file.md). Every unknown key, missing key, wrong type, missing
-/// unit, reversed limit or unknown name is an error with line and column [MF1xx]; all are collected.
+/// Reads a machine definition (docs/machine_file.md). Every unknown key, missing key, wrong type,
+/// missing unit, reversed limit or unknown name is an error with line and column [MF1xx]; all are
+/// collected.
 Result<MachineDefinition> parse_machine_file(std::string_view text, const std::string& file_name,
                                              const std::vector<MachineOverride>& overrides = {});
 

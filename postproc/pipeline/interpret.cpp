@@ -152,6 +152,9 @@ class PathBuilder {
   void set_tool(const Recorder::State& state) {
     compensation_ = state.length;
     if (state.tool > 0) tool_in_use(state.tool);
+    // G43.1 states a length itself, with or without a tool number.
+    if (state.length != 0.0 && !settings_.tool_lengths.contains(state.tool))
+      tool_length_ = state.length;
   }
 
   void tool_in_use(int tool) {

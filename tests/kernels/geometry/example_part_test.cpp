@@ -19,7 +19,8 @@ TEST_CASE("example: the bent sheet is a clean closed solid", "[kernels][geometry
   CHECK(report.closed());
   CHECK(report.components == 1);
   CHECK(mesh_findings(report, "bent_sheet.stl").empty());
-  // Upper and lower side are a sheet of 1.5 mm: volume = half the area of both sides times the thickness.
+  // Upper and lower side are a sheet of 1.5 mm: volume = half the area of both sides times the
+  // thickness.
   CHECK(report.signed_volume == Approx(0.5 * report.area * 1.5).epsilon(0.02));
   CHECK(report.min.z() == Approx(-1.5).margin(1e-5));
   CHECK(report.max.z() == Approx(60.0).margin(1e-5));

@@ -406,6 +406,19 @@ TEST_CASE("convert: tools of different length", "[postproc][pipeline]") {
   }
 }
 
+TEST_CASE("interpret: G43.1 states the tool length itself", "[postproc][pipeline]") {
+  const auto read =
+      interpret_nc("%\nM428\nG21 G90 G94\nG43.1 Z42\nG0 X0 Y0 Z20 A0 C0\nG1 X10 F500\nM30\n%\n",
+                   posted_for("table_table_ac"));
+  for (const auto& d : read.diagnostics()) UNSCOPED_INFO(to_string(d));
+  REQUIRE(read.ok());
+  for (const auto& p : read.value().path.points) {
+    CHECK(p.tool_length == 42.0);
+    CHECK(p.tip_offset == 0.0);
+    CHECK(p.location.tip.z() == Approx(20.0));
+  }
+}
+
 TEST_CASE("convert: the same input gives the same bytes", "[postproc][pipeline]") {
   const auto in = prepare(kMill, "table_table_ac", "table_table_bc");
   CHECK(convert(in, false, {}).program == convert(in, false, {}).program);

@@ -1,9 +1,10 @@
 /* smoothpost: C interface of libsmoothpost. Apache-2.0.
  *
- * One call runs one command of the tool. Handles are opaque and come in create/destroy pairs; structures
- * begin with their size, so that a caller built against an older header keeps working; enum values never
- * change. No exceptions cross it, nothing is printed, no locale and no global state is touched: calls
- * with different arguments may run on different threads at the same time. Strings are UTF-8.
+ * One call runs one command of the tool. Handles are opaque and come in create/destroy pairs;
+ * structures begin with their size, so that a caller built against an older header keeps working;
+ * enum values never change. No exceptions cross it, nothing is printed, no locale and no global
+ * state is touched: calls with different arguments may run on different threads at the same time.
+ * Strings are UTF-8.
  *
  *   smoothpost_options options;
  *   smoothpost_options_init(&options, sizeof options);
@@ -31,16 +32,18 @@ extern "C" {
 #define SMOOTHPOST_API
 #endif
 
-/* Raised when a caller must be rebuilt. New functions and new members at the end of structures do not. */
+/* Raised when a caller must be rebuilt. New functions and new members at the end of structures do
+ * not. */
 #define SMOOTHPOST_ABI_VERSION 1
 
 /* The exit statuses of the tool. */
 typedef enum smoothpost_status {
-  SMOOTHPOST_CERTIFIED = 0,  /* certified and written (or: the command did what it says) */
-  SMOOTHPOST_INTERNAL = 1,   /* internal error */
-  SMOOTHPOST_USAGE = 2,      /* options that make no sense */
-  SMOOTHPOST_REFUSED = 3,    /* a limit, tolerance or process rule cannot be met; nothing written unless force */
-  SMOOTHPOST_UNREADABLE = 4  /* the input cannot be read or understood */
+  SMOOTHPOST_CERTIFIED = 0, /* certified and written (or: the command did what it says) */
+  SMOOTHPOST_INTERNAL = 1,  /* internal error */
+  SMOOTHPOST_USAGE = 2,     /* options that make no sense */
+  SMOOTHPOST_REFUSED =
+      3, /* a limit, tolerance or process rule cannot be met; nothing written unless force */
+  SMOOTHPOST_UNREADABLE = 4 /* the input cannot be read or understood */
 } smoothpost_status;
 
 typedef enum smoothpost_severity {
@@ -56,7 +59,7 @@ typedef int (*smoothpost_progress)(void* user, const char* stage, double share);
 /* Every option of the command line under its name there; NULL or 0 means not given. */
 typedef struct smoothpost_options {
   size_t size; /* sizeof(smoothpost_options) of the caller; set by smoothpost_options_init */
-  const char* command; /* convert | check | machines | formats | golden */
+  const char* command;          /* convert | check | machines | formats | golden */
   const char* const* arguments; /* words after the command: list, show NAME, run DIR */
   size_t argument_count;
   const char* input; /* a path; with input_data only a name for messages */
@@ -110,8 +113,8 @@ SMOOTHPOST_API void smoothpost_options_init(smoothpost_options* options, size_t 
 /* What a run made. */
 typedef struct smoothpost_result smoothpost_result;
 
-/* Runs one command. *result is set in every case except when memory is short or an argument is NULL, and
- * is to be destroyed by the caller. Returns its status. */
+/* Runs one command. *result is set in every case except when memory is short or an argument is
+ * NULL, and is to be destroyed by the caller. Returns its status. */
 SMOOTHPOST_API smoothpost_status smoothpost_run(const smoothpost_options* options,
                                                 smoothpost_result** result);
 SMOOTHPOST_API void smoothpost_result_destroy(smoothpost_result* result);
@@ -122,8 +125,10 @@ SMOOTHPOST_API smoothpost_status smoothpost_result_status(const smoothpost_resul
 SMOOTHPOST_API const char* smoothpost_result_program(const smoothpost_result* result, size_t* size);
 SMOOTHPOST_API const char* smoothpost_result_program_path(const smoothpost_result* result);
 SMOOTHPOST_API const char* smoothpost_result_report(const smoothpost_result* result, size_t* size);
-SMOOTHPOST_API const char* smoothpost_result_line_map(const smoothpost_result* result, size_t* size);
-SMOOTHPOST_API const char* smoothpost_result_trajectory(const smoothpost_result* result, size_t* size);
+SMOOTHPOST_API const char* smoothpost_result_line_map(const smoothpost_result* result,
+                                                      size_t* size);
+SMOOTHPOST_API const char* smoothpost_result_trajectory(const smoothpost_result* result,
+                                                        size_t* size);
 /* Text for people: of machines, formats and golden. */
 SMOOTHPOST_API const char* smoothpost_result_text(const smoothpost_result* result, size_t* size);
 SMOOTHPOST_API const char* smoothpost_result_verdict(const smoothpost_result* result);
@@ -142,7 +147,8 @@ typedef struct smoothpost_diagnostic {
 } smoothpost_diagnostic;
 
 SMOOTHPOST_API size_t smoothpost_result_diagnostic_count(const smoothpost_result* result);
-/* Fills *diagnostic; strings live as long as the result. Returns 0, or -1 when there is no such index. */
+/* Fills *diagnostic; strings live as long as the result. Returns 0, or -1 when there is no such
+ * index. */
 SMOOTHPOST_API int smoothpost_result_diagnostic(const smoothpost_result* result, size_t index,
                                                 smoothpost_diagnostic* diagnostic);
 /* All diagnostics as a JSON array. */
