@@ -1,7 +1,6 @@
 #include "postproc/pipeline/interpret.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "formats/csv/cutter_locations.h"
@@ -162,8 +161,6 @@ class PathBuilder {
     tool_ = tool;
     const auto known = settings_.tool_lengths.find(tool);
     tool_length_ = known == settings_.tool_lengths.end() ? 0.0 : known->second;
-    if (known == settings_.tool_lengths.end() && compensation_ == 0.0)
-      unknown_length_.insert({tool, 0});
   }
 
   void set_offset(const Recorder::State& state) {
@@ -384,7 +381,6 @@ class PathBuilder {
   double compensation_ = 0.0;
   int tool_ = 0;
   double tool_length_ = 0.0;
-  std::map<int, int> unknown_length_;
   bool beam_ = false;
   bool lost_ = false;
   std::uint32_t first_line_ = 0;

@@ -29,7 +29,6 @@ struct Verification {
   std::vector<AxisSummary> axes;
   double scheduled_time =
       0.0;  ///< s, of the output: feeds as printed, rapids at the velocity limits
-  std::size_t beam_on_samples = 0;
 };
 
 /// The output's text, read back, against the machine alone: position limits at every move, planned
@@ -45,8 +44,8 @@ struct DeviationInput {
 };
 
 /// The output's text, read back, against the input: tip and tool axis everywhere along every block
-/// at equal path parameter, the completeness and order of the map, and the printed against the
-/// planned joints.
+/// at equal path parameter, the beam, the completeness and order of the map, and the printed
+/// against the planned joints.
 ///
 /// On a block with K steps of size h = 1/K in τ ∈ [0, 1] the deviation d(τ) = output − input
 /// satisfies
