@@ -29,6 +29,8 @@ struct AxisDefinition {
 struct ToolDefinition {
   Vec3 tip = Vec3::Zero();    ///< in the last link, mm; where a tool of length 0 has its tip
   Vec3 axis = Vec3::UnitZ();  ///< unit, from tip to holder
+  Pose flange = Pose::Identity();  ///< X_MF with every joint 0, for controllers that state the tool
+                                   ///< in the flange's frame
   double gap = 0.0;           ///< nominal distance tip to part while the beam is on, mm
   double land_radius = 0.0;
   double min_gap = 0.0;
@@ -56,10 +58,13 @@ enum class RapidMotion { linear, independent };
 struct LinkSettings {
   double clearance = 0.0;    ///< mm along the tool axis
   std::string retract_axis;  ///< axis name
-  double retract = 0.0;      ///< its position for a retract, mm
+  double retract = 0.0;      ///< its position for a retract, mm; has_plane: height of the tip in M
+  bool has_plane = false;    ///< no axis retracts alone: the tip goes up to a plane
   double rotation = 0.0;     ///< rad
   RapidMotion rapid = RapidMotion::linear;
-  std::string rewind = "links_only";
+  bool rewind_in_cut = false;  ///< a cut may be split where a rotary has to be unwound
+  double over_burn = 2.0;      ///< mm that are cut twice where a cut was split
+  double micro_joint = 3.0;    ///< mm, longest beam-off feed that belongs to its cut
 };
 
 /// Shares of the tip and axis tolerance; they sum to 1.
@@ -77,6 +82,7 @@ struct ToleranceSettings {
   double lead = 0.0;  ///< rad
   double tilt = 0.0;  ///< rad
   double clearance = 0.0;
+  double event = 0.5;  ///< mm along the path that an event on the fly may be off its place
   double limit_share =
       1.0;  ///< share of the velocity, acceleration and jerk limits that we plan with
   ToleranceBudget budget;

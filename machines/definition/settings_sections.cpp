@@ -46,12 +46,24 @@ const AxisDefinition* linear_axis(TableReader& reader, std::string_view key,
   return axis;
 }
 
+/// A pose { xyz_mm, rpy_deg } below `key`; the identity when it is absent.
+Pose read_pose(TableReader& reader, std::string_view key, const std::string& name) {
+  TableReader table = reader.table(key, name);
+  Pose pose = Pose::Identity();
+  pose.translation() = table.vector("xyz_mm").value_or(Vec3::Zero());
+  const Vec3 rpy = table.vector("rpy_deg").value_or(Vec3::Zero()) * kRadiansPerDegree;
+  pose.linear() = rotation_from_rpy(rpy[0], rpy[1], rpy[2]);
+  table.finish();
+  return pose;
+}
+
 }  // namespace
 
 ToolDefinition read_tool(TableReader reader) {
   ToolDefinition tool;
   tool.tip = reader.vector("tip_mm").value_or(tool.tip);
   tool.axis = reader.direction("axis").value_or(tool.axis);
+  tool.flange = read_pose(reader, "flange", "tool.flange");
   tool.gap = reader.number_or("gap_mm", 0.0, Bound::not_negative);
   tool.land_radius = reader.number_or("land_radius_mm", 0.0, Bound::not_negative);
   tool.min_gap = reader.number_or("min_gap_mm", 0.0, Bound::not_negative);
@@ -66,12 +78,7 @@ ToolDefinition read_tool(TableReader reader) {
 
 WorkpieceDefinition read_workpiece(TableReader reader) {
   WorkpieceDefinition workpiece;
-  TableReader frame = reader.table("frame", "workpiece.frame");
-  workpiece.frame.translation() = frame.vector("xyz_mm").value_or(Vec3::Zero());
-  const Vec3 degrees = frame.vector("rpy_deg").value_or(Vec3::Zero());
-  const Vec3 rpy = degrees * kRadiansPerDegree;
-  workpiece.frame.linear() = rotation_from_rpy(rpy[0], rpy[1], rpy[2]);
-  frame.finish();
+  workpiece.frame = read_pose(reader, "frame", "workpiece.frame");
   workpiece.thickness = reader.number_or("thickness_mm", 0.0, Bound::not_negative);
   reader.finish();
   return workpiece;
@@ -171,6 +178,7 @@ LinkSettings read_links(TableReader reader, const std::vector<AxisDefinition>& a
   }
   const auto retract = reader.number("retract_mm");
   links.retract = retract.value_or(0.0);
+  links.has_plane = axis == nullptr && retract.has_value();
   if (axis != nullptr && retract && axis->joint.lower < axis->joint.upper &&
       (*retract < axis->joint.lower || *retract > axis->joint.upper))
     reader.error("MF124",
@@ -181,7 +189,10 @@ LinkSettings read_links(TableReader reader, const std::vector<AxisDefinition>& a
   links.rotation = radians_or(reader, "rotation_deg", 0.0, Bound::not_negative);
   const auto rapid = reader.choice("rapid", {"linear", "independent"});
   if (rapid == "independent") links.rapid = RapidMotion::independent;
-  links.rewind = reader.choice("rewind", {"links_only"}).value_or(links.rewind);
+  links.rewind_in_cut =
+      reader.choice("rewind", {"links_only", "in_cut"}).value_or("links_only") == "in_cut";
+  links.over_burn = reader.number_or("over_burn_mm", links.over_burn, Bound::not_negative);
+  links.micro_joint = reader.number_or("micro_joint_mm", links.micro_joint, Bound::not_negative);
   reader.finish();
   return links;
 }
@@ -218,6 +229,7 @@ ToleranceSettings read_tolerance(TableReader reader) {
   tolerance.lead = radians_or(reader, "lead_deg", 0.0, Bound::not_negative);
   tolerance.tilt = radians_or(reader, "tilt_deg", 0.0, Bound::not_negative);
   tolerance.clearance = reader.number_or("clearance_mm", 0.0, Bound::not_negative);
+  tolerance.event = reader.number_or("event_mm", tolerance.event, Bound::positive);
   tolerance.limit_share = reader.number_or("limit_share", 1.0, Bound::positive);
   if (tolerance.limit_share > 1.0)
     reader.error("MF108",

@@ -1,17 +1,19 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "kernels/core/canonical_motion.h"
 #include "kernels/core/joints.h"
+#include "kernels/core/pose.h"
 #include "kernels/core/result.h"
 #include "machines/definition/machine.h"
 
-// What a dialect prints and what it reads back. Both sides speak joints: a dialect knows words and
-// controllers, not tool paths.
+// What a dialect prints and what it reads back: joints, and in its tool mode poses of the tip in W.
+// A dialect knows words and controllers, not tool paths.
 namespace smoothpost {
 
 /// Bit j stands for the joint at index j of the machine file.
@@ -22,13 +24,21 @@ enum class MoveRole : std::uint8_t {
   path   ///< follows the input's tool path
 };
 
-/// One motion of all joints to `to`, linear in every joint.
+/// What a controller keeps straight during a move.
+enum class MoveInterpolation : std::uint8_t {
+  joints,  ///< every joint is linear from one end to the other
+  tool     ///< the tip is on a straight line, the tool turns as Dialect::tool_turn says
+};
+
+/// One motion of all joints to `to`.
 struct MachineMove {
   JointVector to;
   JointMask joints = 0;  ///< joints that this move commands; the others stay where they are
+  MoveInterpolation interpolation = MoveInterpolation::joints;
+  Pose tool = Pose::Identity();  ///< X_WT at `to`, of the tip; set for interpolation tool
   bool rapid = false;
   MoveRole role = MoveRole::path;
-  bool machine_coordinates = false;  ///< print it independent of offsets (G53)
+  bool machine_coordinates = false;  ///< joint words that are valid whatever offsets are live (G53)
   std::uint32_t input_line = 0;
   std::uint32_t segment = 0;  ///< role path: segment of the ToolPath (1 = from point 0 to point 1)
   double from_share = 0.0;    ///< role path: the part of that segment, shares in [0, 1]
@@ -38,7 +48,13 @@ struct MachineMove {
 
 /// What happens before move `before` (or at the end when before == moves.size()).
 struct MachineAction {
-  enum class Kind : std::uint8_t { event, dwell, comment } kind = Kind::event;
+  enum class Kind : std::uint8_t {
+    event,
+    dwell,
+    comment,
+    cut_label  ///< `text` names a cut: a label from where the program can be started again, then
+               ///< every modal word that the moves behind it rely on
+  } kind = Kind::event;
   std::size_t before = 0;
   ProcessEvent event;
   double seconds = 0.0;
@@ -49,6 +65,8 @@ struct MachineAction {
 /// A program in joints: what is to be printed.
 struct MachineProgram {
   std::vector<std::string> title;  ///< comment lines at the top
+  Pose part = Pose::Identity();    ///< X_MW with every joint 0: what BASE or the work offset must be
+  double tool_length = 0.0;        ///< mm, of the tool at the start, for dialects that state it
   std::vector<MachineMove> moves;
   std::vector<MachineAction> actions;  ///< sorted by before
   bool certified = true;               ///< false: print NOT CERTIFIED and an operator stop first
@@ -64,6 +82,9 @@ struct EmittedProgram {
 struct ReadBackMove {
   JointVector to;
   JointMask known = 0;  ///< joints whose position the program has set by the end of this move
+  MoveInterpolation interpolation = MoveInterpolation::joints;
+  Pose tool = Pose::Identity();  ///< interpolation tool: X_WT at the end; `to` holds only the joints
+                                 ///< that the block names (external axes)
   bool rapid = false;
   bool beam = false;      ///< beam on while it moves
   double duration = 0.0;  ///< s, from F; 0 for a rapid
@@ -85,6 +106,15 @@ struct ReadBack {
   bool exact_path = false;    ///< the controller is told not to blend
   std::uint32_t line_count = 0;
   std::uint32_t last_line = 0;
+  std::optional<Pose> part;        ///< X_MW that the text itself sets or demands
+  std::optional<Pose> tool_frame;  ///< X_FT that the text itself sets
+};
+
+/// How a controller turns the tool during a move with MoveInterpolation::tool.
+enum class ToolTurn : std::uint8_t {
+  none,          ///< the dialect has no such moves
+  great_circle,  ///< the tool axis on the great circle; rotation about it is not commanded
+  slerp          ///< one rotation about a fixed axis
 };
 
 /// One row of the table of output dialects (postproc/pipeline/registry).
@@ -92,6 +122,7 @@ struct Dialect {
   const char* name;
   const char* description;
   const char* interpolation;  ///< what the controller does between blocks, for the certificate
+  ToolTurn tool_turn;
   /// Fails with PR1xx when an event has no words on this machine, all such events collected.
   Result<EmittedProgram> (*emit)(const MachineDefinition& machine, const MachineProgram& program);
   /// Reads program text as that controller would; errors NC1xx. `file_name` is for messages.

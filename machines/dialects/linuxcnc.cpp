@@ -108,11 +108,25 @@ class Emitter {
     for (const auto& line : machine_.dialect.start) put_line(line);
     // Where the template does not say so itself: units, absolute, no compensation, G54, no
     // blending.
-    put_line(std::string(inch ? "G20" : "G21") + " G90 G94 G40 G49 G80 G92.1 G54");
-    put_line(machine_.dialect.path_mode == "exact" ? "G61" : "G64 P0.001 Q0");
+    modal_block();
     if (machine_.dialect.offset_guard)
       for (const auto& line : guard_lines()) put_line(line);
     if (!program_.certified) put_line("M0");
+  }
+
+  void modal_block() {
+    const bool inch = machine_.dialect.units == "inch";
+    put_line(std::string(inch ? "G20" : "G21") + " G90 G94 G40 G49 G80 G92.1 G54");
+    put_line(machine_.dialect.path_mode == "exact" ? "G61" : "G64 P0.001 Q0");
+    inverse_time_ = false;
+  }
+
+  // From here on every mode and every axis word is stated anew.
+  void print_label(const MachineAction& action) {
+    set_time_mode(false);
+    put_line("(" + comment_text(action.text) + ")");
+    modal_block();
+    for (auto& word : printed_) word.clear();
   }
 
   void put_line(std::string_view line) {
@@ -148,6 +162,9 @@ class Emitter {
       }
       case MachineAction::Kind::event:
         print_event(action);
+        return;
+      case MachineAction::Kind::cut_label:
+        print_label(action);
         return;
     }
   }
@@ -371,6 +388,6 @@ Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
 const Dialect kDialect = {"linuxcnc", "LinuxCNC 2.9, joint words (trivkins), G93, exact path",
                           "all joints linear between blocks, exact path (G61): the controller "
                           "stops blending at block ends",
-                          &emit, &read_back};
+                          ToolTurn::none, &emit, &read_back};
 
 }  // namespace smoothpost::linuxcnc

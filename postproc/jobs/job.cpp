@@ -44,6 +44,13 @@ class Run {
     if (!refuse_later_options() || !load_output_machine() || !load_input()) return finish();
     ConvertInput in;
     if (!read_program(in) || !place(in) || !read_part(in.part, in.part_name)) return finish();
+    in.keep_links = options_.links == "keep";
+    if (!options_.cuts.empty()) {
+      const auto cuts = parse_cut_range(options_.cuts);
+      add(cuts.diagnostics());
+      if (!cuts.ok()) return finish();
+      in.cuts = cuts.value();
+    }
     in.machine = machine_.definition;
     in.input_name = input_name_;
     in.title = title(in);
@@ -91,11 +98,8 @@ class Run {
         add(usage_error("US122", std::string(option) + " is not possible in this version"));
     };
     refuse(options_.report, "--report");
-    refuse(options_.cuts, "--cuts");
-    if (options_.links == "plan" || (!options_.links.empty() && options_.links != "keep"))
-      add(usage_error("US122", "--links " + options_.links +
-                                   " is not possible in this version: links are kept "
-                                   "as programmed (--links keep)"));
+    if (!options_.links.empty() && options_.links != "plan" && options_.links != "keep")
+      add(usage_error("US148", "--links " + options_.links + ": expected is plan or keep"));
     if (!options_.input_dialect.empty() && options_.input_dialect != "linuxcnc")
       add(usage_error("US122", "--input-dialect " + options_.input_dialect +
                                    " is not read in this version; possible: linuxcnc"));

@@ -11,6 +11,7 @@
 #include "postproc/pipeline/machine_program.h"
 #include "postproc/pipeline/path_match.h"
 #include "postproc/pipeline/registry.h"
+#include "postproc/pipeline/rewind.h"
 
 namespace smoothpost {
 
@@ -131,27 +132,29 @@ class PartCheck {
 };
 
 /// Fills what does not depend on how the program was made.
-void describe_input(const InterpretedInput& input, const ReferencePath& reference,
-                    Conversion& out) {
-  bool in_cut = false;
-  bool in_link = false;
-  for (std::size_t k = 1; k < input.path.points.size(); ++k) {
-    const PathPoint& p = input.path.points[k];
-    const double length = reference.length(k);
-    out.programmed_time += p.duration;
-    out.length += length;
-    const bool cut = p.kind == MotionKind::feed;
-    if (cut && !in_cut) out.cuts.push_back({p.line, p.line, 0.0});
-    if (cut) {
-      out.cuts.back().last_line = p.line;
-      out.cuts.back().length += length;
+void describe_input(const ToolPath& path, const std::vector<Cut>& cuts,
+                    const ReferencePath& reference, Conversion& out) {
+  std::vector<bool> in_cut(path.points.size(), false);
+  for (const Cut& cut : cuts) {
+    if (cut.omitted) continue;
+    CutSummary summary;
+    summary.label = "CUT " + std::to_string(cut.number) + (cut.after_rewind ? " continued" : "");
+    summary.first_line = path.points[cut.first].line;
+    summary.last_line = path.points[cut.last].line;
+    for (std::uint32_t k = cut.first; k <= cut.last; ++k) {
+      in_cut[k] = true;
+      summary.length += reference.length(k);
     }
-    if (!cut && !in_link) ++out.links;
-    in_cut = cut;
-    in_link = !cut;
+    summary.phases = phases_of(reference, cut);
+    out.cuts.push_back(std::move(summary));
   }
-  out.reference = input.reference;
-  out.assumes = input.assumes;
+  bool in_link = false;
+  for (std::size_t k = 1; k < path.points.size(); ++k) {
+    out.programmed_time += path.points[k].duration;
+    out.length += reference.length(k);
+    if (!in_cut[k] && !in_link) ++out.links;
+    in_link = !in_cut[k];
+  }
 }
 
 void describe_promises(const MachineDefinition& machine, bool has_part, Conversion& out) {
@@ -210,15 +213,19 @@ class Converter {
         force_(force),
         progress_(progress),
         watch_(out_.stages),
-        reference_(in.input.path, in.input.frames) {}
+        path_(in.input.path),
+        cuts_(find_cuts(path_, {in.keep_links, in.machine.links.micro_joint, in.cuts})),
+        reference_(path_, in.input.frames) {}
 
   Conversion run() {
-    describe_input(in_.input, reference_, out_);
+    out_.reference = in_.input.reference;
+    out_.assumes = in_.input.assumes;
     const bool beam_part = in_.part && uses_beam();
     describe_promises(in_.machine, beam_part, out_);
     if (!in_.placement_text.empty()) out_.assumes.push_back(in_.placement_text);
     watch_.lap("interpret");
-    if (!recipe_is_possible()) return finish(false);
+    if (!recipe_is_possible() || !has_cuts()) return finish(false);
+    tell_links();
     if (beam_part && !register_input()) return finish(false);
     if (in_.part && !uses_beam()) {
       out_.diagnostics.push_back(diagnostic(
@@ -227,6 +234,7 @@ class Converter {
       out_.diagnostics.back().severity = Severity::note;
     }
     const bool made = plan() && emit() && verify();
+    describe_input(path_, cuts_, reference_, out_);
     return finish(made);
   }
 
@@ -256,6 +264,43 @@ class Converter {
     if (in_.machine.dialect.path_mode != "exact")
       refuse("dialect.path_mode", in_.machine.dialect.path_mode, "exact");
     return !has_error(out_.diagnostics);
+  }
+
+  bool has_cuts() {
+    const auto first = std::find_if(cuts_.begin(), cuts_.end(),
+                                    [](const Cut& c) { return !c.omitted; });
+    if (first != cuts_.end()) return true;
+    if (in_.cuts)
+      out_.diagnostics.push_back(diagnostic(
+          "US147", "--cuts asks for none of the program's " + std::to_string(cuts_.size()) +
+                       " cuts (they count from 1)", in_.input_name));
+    else if (!in_.keep_links)
+      out_.diagnostics.push_back(diagnostic(
+          "PR310", "the program cuts nowhere: it has no feed motion" +
+                       std::string(in_.machine.has_event(event_name::kBeamOn)
+                                       ? " with the beam on" : "") +
+                       ", only rapids. Use --links keep to convert its rapids as they are",
+          in_.input_name));
+    return in_.keep_links && !in_.cuts;
+  }
+
+  // What the links are, said where nobody can overlook it.
+  void tell_links() {
+    const auto warn = [this](const char* code, std::string text) {
+      out_.diagnostics.push_back(diagnostic(code, std::move(text), in_.input_name));
+      out_.diagnostics.back().severity = Severity::warning;
+    };
+    if (in_.keep_links)
+      warn("LK102", "links are the input's own rapids, on your word (--links keep): nothing was "
+                    "checked of where they pass on this machine");
+    else if (!in_.part)
+      warn("LK101", "no part was given (-w PART.stl): links go over the retract plane, and nothing "
+                    "was checked against the part (clearance)");
+    if (in_.cuts)
+      out_.assumes.push_back("only cuts " + std::to_string(in_.cuts->first) + " to " +
+                             std::to_string(std::min<int>(in_.cuts->last, cuts_.back().number)) +
+                             " of " + std::to_string(cuts_.back().number) +
+                             " are in this program (--cuts)");
   }
 
   bool register_input() {
@@ -292,14 +337,47 @@ class Converter {
     settings.held = home_of(in_.machine);
     settings.file_name = in_.input_name;
     for (const auto& axis : in_.machine.axes) settings.axis_names.push_back(axis.name);
-    const auto samples = plan_joints(reference_, *pair, settings, progress_);
-    append(out_.diagnostics, samples.diagnostics());
+    settings.may_split = in_.machine.links.rewind_in_cut;
+    auto planned = plan_joints(reference_, *pair, settings, progress_);
+    if (planned.ok() && !planned.value().splits.empty()) {
+      split(planned.value().splits);
+      settings.may_split = false;
+      planned = plan_joints(reference_, *pair, settings, progress_);
+    }
+    append(out_.diagnostics, planned.diagnostics());
     watch_.lap("kinematics");
-    if (!samples.ok()) return false;
-    program_ = build_program(in_.input, in_.machine, chain_, samples.value());
+    if (!planned.ok()) return false;
+    program_ = build_program({path_, cuts_, in_.machine, chain_, part_box()},
+                             planned.value().samples);
+    program_.part = chain_.workpiece_home;
+    program_.tool_length = path_.points.back().tool_length;
     program_.title = in_.title;
     program_.certified = true;
     return true;
+  }
+
+  void split(const std::vector<SplitPlace>& places) {
+    std::string lines;
+    for (const auto& place : places)
+      lines += (lines.empty() ? "" : ", ") + std::to_string(path_.points[place.segment].line);
+    split_cuts(path_, cuts_, in_.input.frames, places, in_.machine.links.over_burn);
+    out_.assumes.push_back("cuts are split to unwind an axis (links.rewind = \"in_cut\") and cut " +
+                           number(in_.machine.links.over_burn) +
+                           " mm twice there: input lines " + lines);
+    out_.diagnostics.push_back(
+        diagnostic("LK103", out_.assumes.back(), in_.input_name,
+                   static_cast<int>(path_.points[places.front().segment].line)));
+    out_.diagnostics.back().severity = Severity::warning;
+  }
+
+  std::optional<PartBox> part_box() const {
+    if (!in_.part || in_.part->vertices.empty()) return {};
+    PartBox box{in_.part->vertices.front(), in_.part->vertices.front()};
+    for (const Vec3& v : in_.part->vertices) {
+      box.lower = box.lower.cwiseMin(v);
+      box.upper = box.upper.cwiseMax(v);
+    }
+    return box;
   }
 
   bool emit() {
@@ -404,6 +482,8 @@ class Converter {
   const Progress& progress_;
   Conversion out_;
   Stopwatch watch_;
+  ToolPath path_;
+  std::vector<Cut> cuts_;
   ReferencePath reference_;
   ScrewChain chain_;
   MachineProgram program_;
@@ -423,10 +503,14 @@ namespace {
 /// shares of the tolerances, so both deviations are told as that share of theirs.
 Checks shape_checks(const CheckInput& in, const ReadBack& read, const ScrewChain& chain,
                     const Progress& progress) {
-  const ReferencePath reference(in.against->path, in.against->frames);
+  ToolPath path = in.against->path;
+  find_cuts(path, {false, in.machine.links.micro_joint, {}});
+  const ReferencePath reference(path, in.against->frames);
   const auto& tolerance = in.machine.tolerance;
+  const bool beam = std::any_of(path.points.begin(), path.points.end(),
+                                [](const PathPoint& p) { return p.beam; });
   const PathMatch match =
-      match_paths(read, chain, reference, {tolerance.tip, tolerance.axis}, progress);
+      match_paths(read, chain, reference, {tolerance.tip, tolerance.axis, beam}, progress);
   const auto check = [&](const char* name, double limit, const char* unit) {
     Check c;
     c.name = name;

@@ -6,6 +6,7 @@
 
 #include "kernels/core/mesh.h"
 #include "kernels/core/progress.h"
+#include "postproc/pipeline/cuts.h"
 #include "postproc/pipeline/interpret.h"
 #include "postproc/pipeline/line_map.h"
 #include "postproc/pipeline/verify.h"
@@ -23,16 +24,20 @@ struct ConvertInput {
   std::string part_name;
   std::string input_name;
   std::vector<std::string> title;  ///< comment lines at the top of the program
+  bool keep_links = false;         ///< --links keep: rapids stay as the input has them
+  std::optional<CutRange> cuts;    ///< --cuts: the others are left out
 };
 
 enum class Verdict { certified, limits_only, refused, forced };
 std::string to_string(Verdict verdict);
 
-/// A run of feed motions of the input.
+/// A cut of the input.
 struct CutSummary {
+  std::string label;  ///< as its label in the program says: "CUT 7"
   std::uint32_t first_line = 0;
   std::uint32_t last_line = 0;
   double length = 0.0;  ///< mm, of the tip
+  CutPhases phases;
 };
 
 struct StageTime {

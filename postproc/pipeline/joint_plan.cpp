@@ -32,9 +32,11 @@ class Planner {
     cap_ = 0.4 * settings.axis_tolerance;
   }
 
-  Result<std::vector<JointSample>> run() {
+  Result<JointPlan> run() {
     collect_tracked();
     const BranchTracking tracking = track();
+    if (tracking.status == BranchTracking::Status::rewind_needed && settings_.may_split)
+      return Result<JointPlan>(splits(tracking));
     if (tracking.status != BranchTracking::Status::ok) return fail(tracking);
     for (std::size_t i = 0; i < tracked_.size(); ++i) {
       JointSample to = tracked_[i];
@@ -49,7 +51,9 @@ class Planner {
           !progress_("kinematics", static_cast<double>(i) / static_cast<double>(tracked_.size())))
         return cancelled();
     }
-    return Result<std::vector<JointSample>>(std::move(samples_));
+    JointPlan plan;
+    plan.samples = std::move(samples_);
+    return Result<JointPlan>(std::move(plan));
   }
 
  private:
@@ -80,14 +84,13 @@ class Planner {
   }
 
   void collect_tracked() {
-    tracked_.push_back({0, 1.0, 0, {}});
-    locations_.push_back(target(0, 1.0));
+    if (reference_.segments() == 0 || !replanned(1)) add_tracked(0, 1.0, target(0, 1.0));
     for (std::size_t k = 1; k <= reference_.segments(); ++k) {
       if (!replanned(k)) {
         const CutterLocation from = target(k, 0.0);
         const CutterLocation to = target(k, 1.0);
         subdivide(k, {0.0, from}, {1.0, to}, 0);
-      } else {
+      } else if (k < reference_.segments() && !replanned(k + 1)) {
         add_tracked(k, 1.0, target(k, 1.0));
       }
     }
@@ -227,7 +230,7 @@ class Planner {
     return text;
   }
 
-  Result<std::vector<JointSample>> fail(const BranchTracking& tracking) const {
+  Result<JointPlan> fail(const BranchTracking& tracking) const {
     Diagnostics out;
     const std::uint32_t line = reference_.path().points[tracked_[tracking.point].segment].line;
     switch (tracking.status) {
@@ -247,16 +250,17 @@ class Planner {
           out.push_back(
               at_line("KN103", rewind.line,
                       "the cut cannot go on without a rewind here: " + named(rewind.reason) +
-                          ". Split the cut before this line or choose a machine with more range"));
+                          ". Split the cut before this line, set links.rewind = \"in_cut\", or choose a "
+                      "machine with more range"));
         if (out.empty())
           out.push_back(at_line("KN103", line, "a rewind is needed: " + named(tracking.reason)));
         break;
     }
-    return Result<std::vector<JointSample>>::failure(std::move(out));
+    return Result<JointPlan>::failure(std::move(out));
   }
 
-  Result<std::vector<JointSample>> too_steep(std::size_t segment) const {
-    return Result<std::vector<JointSample>>::failure(
+  Result<JointPlan> too_steep(std::size_t segment) const {
+    return Result<JointPlan>::failure(
         at_line("KN104", reference_.path().points[segment].line,
                 "the machine cannot follow this motion inside the tolerances: a rotary would have "
                 "to jump (the "
@@ -264,11 +268,21 @@ class Planner {
                 "axis there"));
   }
 
-  static Result<std::vector<JointSample>> cancelled() {
+  // The last place that can be reached before each dead end.
+  JointPlan splits(const BranchTracking& tracking) const {
+    JointPlan plan;
+    for (const auto& rewind : tracking.rewinds) {
+      const JointSample& before = tracked_[rewind.point - 1];
+      plan.splits.push_back({before.segment, before.s});
+    }
+    return plan;
+  }
+
+  static Result<JointPlan> cancelled() {
     Diagnostic d;
     d.code = "US190";
     d.text = "cancelled";
-    return Result<std::vector<JointSample>>::failure(d);
+    return Result<JointPlan>::failure(d);
   }
 
   const ReferencePath& reference_;
@@ -288,7 +302,7 @@ CutterLocation holder_location(const CutterLocation& tip, double tool_length) {
   return {tip.tip + tool_length * tip.axis, tip.axis};
 }
 
-Result<std::vector<JointSample>> plan_joints(const ReferencePath& reference, const RotaryPair& pair,
+Result<JointPlan> plan_joints(const ReferencePath& reference, const RotaryPair& pair,
                                              const JointPlanSettings& settings,
                                              const Progress& progress) {
   return Planner(reference, pair, settings, progress).run();

@@ -18,6 +18,7 @@ struct JointPlanSettings {
   JointVector held;             ///< redundant joints' values; also where the joints start from
   std::string file_name;        ///< for messages
   std::vector<std::string> axis_names;  ///< for messages, in joint order
+  bool may_split = false;               ///< a cut may be split where a rotary has to be unwound
 };
 
 /// Joint values on the way: at share `s` of `segment` (segment 0: the first path point).
@@ -28,15 +29,26 @@ struct JointSample {
   JointVector q;
 };
 
+/// A place inside a cut that has no continuous way on: the cut has to be split there.
+struct SplitPlace {
+  std::uint32_t segment = 0;
+  double s = 1.0;
+};
+
+struct JointPlan {
+  std::vector<JointSample> samples;
+  std::vector<SplitPlace> splits;  ///< not empty: no samples; split there and plan again
+};
+
 /// Joint values along the whole reference path, close enough that straight joint motion from each
 /// sample to the next stays inside the tolerances (checked at quarter points; the certificate
 /// bounds it). One global choice of branch and winding; the last sample of every segment is at s
-/// = 1. `pair` is the output machine's chain with tool length 0 and the part placed in it.
-/// Failures: KN101 unreachable, KN102 limits, KN103 rewind needed (input lines named), KN104 a
-/// motion that cannot be followed inside the tolerances. Cost: linear in the samples.
-Result<std::vector<JointSample>> plan_joints(const ReferencePath& reference, const RotaryPair& pair,
-                                             const JointPlanSettings& settings,
-                                             const Progress& progress);
+/// = 1. Of a run of replanned segments only its end has a sample: where the next run starts. `pair` is the output machine's chain with tool length 0 and the part placed in it.
+/// Failures: KN101 unreachable, KN102 limits, KN103 rewind needed (input lines named; with
+/// settings.may_split the places are in JointPlan::splits instead), KN104 a motion that cannot be
+/// followed inside the tolerances. Cost: linear in the samples.
+Result<JointPlan> plan_joints(const ReferencePath& reference, const RotaryPair& pair,
+                              const JointPlanSettings& settings, const Progress& progress);
 
 /// The holder's reference point for a tool of `tool_length`: what a chain of tool length 0 is asked
 /// for.

@@ -1,10 +1,12 @@
 #include "postproc/pipeline/machine_program.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <map>
 
+#include "kernels/core/process.h"
 #include "kernels/core/units.h"
+#include "postproc/pipeline/event_latency.h"
 
 namespace smoothpost {
 
@@ -12,139 +14,166 @@ namespace {
 
 constexpr double kSlowestRotaryFeed = 30.0 * kRadiansPerDegree;  // rad/s, turning without a feed
 
+// The retract position of the machine file, or further out where the path itself goes further
+// out: a link over the plane never runs below the highest place of the path.
+double retract_beyond(const MachineDefinition& machine, const std::vector<JointSample>& samples) {
+  const int axis = machine.axis_by_name(machine.links.retract_axis);
+  double position = machine.links.retract;
+  if (axis < 0) return position;
+  const auto& joint = machine.axes[static_cast<std::size_t>(axis)].joint;
+  const bool upwards = position >= 0.5 * (joint.lower + joint.upper);
+  for (const auto& sample : samples)
+    position = upwards ? std::max(position, sample.q[axis]) : std::min(position, sample.q[axis]);
+  return position;
+}
+
 class Builder {
  public:
-  Builder(const InterpretedInput& input, const MachineDefinition& machine, const ScrewChain& chain,
-          const std::vector<JointSample>& samples)
-      : input_(input), machine_(machine), chain_(chain), samples_(samples) {
-    retract_ = machine.axis_by_name(machine.links.retract_axis);
-    if (retract_ >= 0) retract_position_ = retract_beyond_path();
-    for (int j = 0; j < machine.size(); ++j) {
-      const bool rotary = machine.axes[static_cast<std::size_t>(j)].joint.kind == JointKind::rotary;
-      (rotary ? rotary_ : linear_) |= 1U << j;
-    }
+  Builder(const ProgramInput& input, const std::vector<JointSample>& samples)
+      : in_(input),
+        machine_(input.machine),
+        samples_(samples),
+        links_(input.machine, input.chain, retract_beyond(input.machine, samples), input.part) {
+    all_ = (1U << machine_.size()) - 1U;
     out_.moves.reserve(samples.size() + 16);
   }
 
   MachineProgram run() {
-    if (retract_ >= 0) add_link(1U << retract_, with_retract(samples_.front().q), true);
-    emit_events(0, true);
-    arrive(samples_.front().q);
-    emit_events(0, false);
-    for (std::size_t i = 1; i < samples_.size(); ++i) {
-      const JointSample& sample = samples_[i];
-      const PathPoint& point = input_.path.points[sample.segment];
-      if (point.replanned) {
-        depart(samples_[i - 1].q);
-        arrive(sample.q);
-      } else {
-        follow(i, point);
-      }
-      if (sample.s == 1.0) emit_events(sample.segment, false);
+    std::size_t end = 0;  // sample behind the last run
+    while (end < samples_.size()) {
+      const std::size_t begin = end++;
+      while (end < samples_.size() && !in_.path.points[samples_[end].segment].replanned) ++end;
+      run_of(begin, end);
     }
-    depart(samples_.back().q);
-    const JointVector home = home_of(machine_);
-    add_link(rotary_, home, false);
-    add_link(linear_ & ~retract_bit(), home, false);
+    const Link home = links_.last(link_end(samples_.size() - 1));
+    append(home.away);
+    emit_until(in_.path.points.size());
+    compensate_latency(out_, machine_);
     return std::move(out_);
   }
 
  private:
-  JointMask retract_bit() const { return retract_ < 0 ? 0U : 1U << retract_; }
-
-  // The retract position of the machine file, or further out where the path itself goes further
-  // out: a link never runs below the highest place of the path.
-  double retract_beyond_path() const {
-    const auto& joint = machine_.axes[static_cast<std::size_t>(retract_)].joint;
-    const bool upwards = machine_.links.retract >= 0.5 * (joint.lower + joint.upper);
-    double position = machine_.links.retract;
-    for (const auto& sample : samples_)
-      position =
-          upwards ? std::max(position, sample.q[retract_]) : std::min(position, sample.q[retract_]);
-    return position;
-  }
-
-  JointVector with_retract(JointVector q) const {
-    if (retract_ >= 0) q[retract_] = retract_position_;
-    return q;
-  }
-
-  void emit_events(std::size_t point, bool before_start) {
-    const auto& events = input_.path.events;
-    while (next_event_ < events.size() && events[next_event_].point == point &&
-           (!before_start || events[next_event_].before_start)) {
-      const PathEvent& e = events[next_event_++];
-      MachineAction action;
-      action.before = out_.moves.size();
-      action.kind = e.kind == PathEvent::Kind::process ? MachineAction::Kind::event
-                    : e.kind == PathEvent::Kind::dwell ? MachineAction::Kind::dwell
-                                                       : MachineAction::Kind::comment;
-      action.event = e.event;
-      action.seconds = e.seconds;
-      action.text = e.text;
-      action.input_line = e.line;
-      out_.actions.push_back(std::move(action));
+  // Samples begin .. end-1; the first is where the run starts.
+  void run_of(std::size_t begin, std::size_t end) {
+    const std::size_t start_point = samples_[begin].segment;
+    Link link;
+    if (begin == 0) {
+      link = links_.first(link_end(begin));
+    } else {
+      link = links_.between(link_end(begin - 1), link_end(begin), changes_tool(start_point));
+      append(link.away);
+    }
+    if (end > begin + 1) label(samples_[begin + 1].segment);
+    append(link.approach, 0, link.retracted);
+    restate(start_point);
+    emit_until(start_point);
+    append(link.approach, link.retracted, link.approach.size());
+    emit_at(start_point, true);
+    for (std::size_t i = begin + 1; i < end; ++i) {
+      const PathPoint& point = in_.path.points[samples_[i].segment];
+      follow(i, point);
+      if (samples_[i].s == 1.0) emit_at(samples_[i].segment, i + 1 < end);
     }
   }
 
-  void add_link(JointMask joints, const JointVector& to, bool machine_coordinates) {
-    MachineMove move;
-    move.to = to;
-    move.joints = joints;
-    move.rapid = true;
-    move.role = MoveRole::link;
-    move.machine_coordinates = machine_coordinates;
-    if (joints != 0) out_.moves.push_back(std::move(move));
+  LinkEnd link_end(std::size_t sample) const {
+    return {samples_[sample].q, in_.path.points[samples_[sample].segment].tool_length};
   }
 
-  // The joints with the tool `clearance` further out along its axis: the rotaries stay, the linears
-  // move.
-  JointVector clear_of(const JointVector& q) const {
-    const Jacobian j = jacobian(chain_, q);
-    const Vec3 away = machine_.links.clearance * forward_location(chain_, q).axis;
-    Eigen::Matrix3d d;
-    std::array<int, 3> column{};
-    int n = 0;
-    for (int i = 0; i < chain_.size() && n < 3; ++i) {
-      const auto& joint = chain_.joints[static_cast<std::size_t>(i)];
-      if (joint.kind != JointKind::linear || joint.redundant) continue;
-      d.col(n) = j.col(i).tail<3>();
-      column[static_cast<std::size_t>(n++)] = i;
+  void append(const std::vector<MachineMove>& moves, std::size_t from = 0,
+              std::size_t to = static_cast<std::size_t>(-1)) {
+    for (std::size_t i = from; i < std::min(to, moves.size()); ++i) out_.moves.push_back(moves[i]);
+  }
+
+  void label(std::uint32_t segment) {
+    const auto cut = std::find_if(in_.cuts.begin(), in_.cuts.end(), [segment](const Cut& c) {
+      return c.first <= segment && segment <= c.last;
+    });
+    MachineAction action;
+    action.kind = MachineAction::Kind::cut_label;
+    action.before = out_.moves.size();
+    action.input_line = in_.path.points[segment].line;
+    if (cut != in_.cuts.end()) {
+      action.text = "CUT " + std::to_string(cut->number) +
+                    (cut->after_rewind ? " goes on after a rewind" : "");
+    } else {
+      action.text = "PATH";
     }
-    JointVector clear = q;
-    if (n < 3) return clear;
-    const Vec3 step = d.fullPivLu().solve(away);
-    for (int i = 0; i < 3; ++i) clear[column[static_cast<std::size_t>(i)]] += step[i];
-    for (const int i : column) {
-      const auto& joint = chain_.joints[static_cast<std::size_t>(i)];
-      if (clear[i] < joint.lower || clear[i] > joint.upper)
-        return q;  // no room: the retract axis alone
+    action.text += " from input line " + std::to_string(action.input_line);
+    out_.actions.push_back(std::move(action));
+  }
+
+  bool is_tool_change(const PathEvent& e) const {
+    return e.kind == PathEvent::Kind::process && e.event.name == event_name::kToolChange;
+  }
+
+  bool changes_tool(std::size_t before_point) const {
+    for (std::size_t i = next_event_; i < in_.path.events.size(); ++i) {
+      if (in_.path.events[i].point > before_point) break;
+      if (is_tool_change(in_.path.events[i])) return true;
     }
-    return clear;
+    return false;
   }
 
-  // From the retract position to q: rotaries, the other linears, down the retract axis, along the
-  // tool.
-  void arrive(const JointVector& q) {
-    const JointVector above = clear_of(q);
-    add_link(rotary_, above, false);
-    add_link(linear_ & ~retract_bit(), above, false);
-    add_link(retract_bit(), above, false);
-    if ((above - q).norm() > 0.0) add_link(linear_, q, false);
+  // States that are on and that no event of this link sets anew.
+  void restate(std::size_t start_point) {
+    std::vector<std::string> set_here;
+    const auto& events = in_.path.events;
+    for (std::size_t i = next_event_; i < events.size() && events[i].point <= start_point; ++i)
+      if (events[i].kind == PathEvent::Kind::process)
+        set_here.push_back(state_group(events[i].event.name));
+    for (const auto& [group, event] : states_) {
+      if (group == "tool" || std::find(set_here.begin(), set_here.end(), group) != set_here.end())
+        continue;
+      emit(event);
+    }
   }
 
-  void depart(const JointVector& q) {
-    const JointVector above = clear_of(q);
-    if ((above - q).norm() > 0.0) add_link(linear_, above, false);
-    if (retract_ >= 0) add_link(retract_bit(), with_retract(above), false);
+  // Events before `point`, and those at it that stand before the run's start in the input.
+  void emit_until(std::size_t point) {
+    const auto& events = in_.path.events;
+    while (next_event_ < events.size() &&
+           (events[next_event_].point < point ||
+            (events[next_event_].point == point && events[next_event_].before_start)))
+      emit(events[next_event_++]);
+  }
+
+  // Events at `point`; at the end of a run those from a tool change on wait for the link.
+  void emit_at(std::size_t point, bool inside) {
+    const auto& events = in_.path.events;
+    while (next_event_ < events.size() && events[next_event_].point <= point) {
+      if (!inside && is_tool_change(events[next_event_])) return;
+      emit(events[next_event_++]);
+    }
+  }
+
+  void emit(const PathEvent& e) {
+    MachineAction action;
+    action.before = out_.moves.size();
+    action.kind = e.kind == PathEvent::Kind::process ? MachineAction::Kind::event
+                  : e.kind == PathEvent::Kind::dwell ? MachineAction::Kind::dwell
+                                                     : MachineAction::Kind::comment;
+    action.event = e.event;
+    action.seconds = e.seconds;
+    action.text = e.text;
+    action.input_line = e.line;
+    out_.actions.push_back(std::move(action));
+    if (e.kind != PathEvent::Kind::process) return;
+    const std::string group = state_group(e.event.name);
+    if (group.empty()) return;
+    if (ends_state(e.event.name))
+      states_.erase(group);
+    else
+      states_.insert_or_assign(group, e);
   }
 
   void follow(std::size_t i, const PathPoint& point) {
     const JointSample& to = samples_[i];
     MachineMove move;
     move.to = to.q;
-    move.joints = rotary_ | linear_;
+    move.joints = all_;
     move.rapid = point.kind == MotionKind::rapid && machine_.links.rapid == RapidMotion::linear;
+    move.role = MoveRole::path;
     move.input_line = point.line;
     move.segment = to.segment;
     move.from_share = samples_[i - 1].segment == to.segment ? samples_[i - 1].s : 0.0;
@@ -170,23 +199,20 @@ class Builder {
     return std::max(time, machine_.cycle.min_block);
   }
 
-  const InterpretedInput& input_;
+  const ProgramInput& in_;
   const MachineDefinition& machine_;
-  const ScrewChain& chain_;
   const std::vector<JointSample>& samples_;
-  int retract_ = -1;
-  double retract_position_ = 0.0;
-  JointMask rotary_ = 0;
-  JointMask linear_ = 0;
+  LinkPlanner links_;
+  JointMask all_ = 0;
   std::size_t next_event_ = 0;
+  std::map<std::string, PathEvent> states_;
   MachineProgram out_;
 };
 
 }  // namespace
 
-MachineProgram build_program(const InterpretedInput& input, const MachineDefinition& machine,
-                             const ScrewChain& chain, const std::vector<JointSample>& samples) {
-  return Builder(input, machine, chain, samples).run();
+MachineProgram build_program(const ProgramInput& input, const std::vector<JointSample>& samples) {
+  return Builder(input, samples).run();
 }
 
 }  // namespace smoothpost

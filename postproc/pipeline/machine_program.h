@@ -1,29 +1,39 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "kernels/core/result.h"
 #include "machines/dialects/dialect.h"
-#include "postproc/pipeline/interpret.h"
+#include "postproc/pipeline/cuts.h"
 #include "postproc/pipeline/joint_plan.h"
+#include "postproc/pipeline/links.h"
 
 namespace smoothpost {
 
 /// The share of an assumed velocity limit that block times use.
 inline constexpr double kAssumedShare = 0.9;
 
-/// Puts joint samples, events and the machine's start, relocation and end motions into one program.
-///  - Start: retract axis alone; rotaries; the other linears; the retract axis down to a point on
-///  the tool
-///    axis above the first path point; along the tool axis to it.
-///  - Replanned segments: away along the tool axis, then as the start.
-///  - End: away along the tool axis, retract axis, rotaries home, linears home.
+struct ProgramInput {
+  const ToolPath& path;            ///< with its links marked (find_cuts)
+  const std::vector<Cut>& cuts;
+  const MachineDefinition& machine;
+  const ScrewChain& chain;         ///< of the machine, tool length 0, part placed
+  std::optional<PartBox> part;
+};
+
+/// Puts joint samples, events and links into one program.
+///  - Each stretch of the path without a replanned segment is one run: away from the last one, a
+///    label, an approach of its own, its events, its moves. The label stands where the machine has
+///    left the part; what stands behind it states every axis and every state (spindle, coolant,
+///    power ...) that the run needs, so that a program can be started there.
+///  - Events inside a link happen at its retracted place, a tool change also when the input has it
+///    at the end of a cut.
 ///  - Block times: the programmed feed, stretched until no joint exceeds its velocity limit times
 ///    tolerance.limit_share (times kAssumedShare where the limit is assumed) and no block is
 ///    shorter than cycle.min_block.
-/// `chain` is the output machine's with tool length 0 and the part placed in it.
-MachineProgram build_program(const InterpretedInput& input, const MachineDefinition& machine,
-                             const ScrewChain& chain, const std::vector<JointSample>& samples);
+///  - Events on the fly with a latency stand that much earlier on the run, at its planned speed, as
+///    far as the run and the last stop before them allow.
+MachineProgram build_program(const ProgramInput& input, const std::vector<JointSample>& samples);
 
 }  // namespace smoothpost

@@ -173,6 +173,7 @@ class Matcher {
           const PathMatchSettings& settings, const Progress& progress)
       : program_(program),
         input_(input),
+        settings_(settings),
         progress_(progress),
         metric_(settings),
         samples_(program, chain, metric_) {}
@@ -188,7 +189,7 @@ class Matcher {
     }
     // Behind the last stretch only rapids are left.
     for (std::size_t i = move_; i < program_.moves.size(); ++i)
-      if (!program_.moves[i].rapid)
+      if (!is_free(program_.moves[i]))
         return fail(points.back().line, program_.moves[i].line,
                     "a feed move of the program is not in the input");
     out_.matched = true;
@@ -197,6 +198,11 @@ class Matcher {
   }
 
  private:
+  // What a link may be made of.
+  bool is_free(const ReadBackMove& move) const {
+    return move.rapid || (settings_.beam && !move.beam);
+  }
+
   bool match_stretch(std::size_t first, std::size_t last) {
     const double tool_length = input_.path().points[first].tool_length;
     const std::vector<Sample> wanted = input_samples(input_, first, last, metric_);
@@ -212,7 +218,7 @@ class Matcher {
         fail(0, 0, "cancelled");
         return false;
       }
-      const bool rapid = program_.moves[i].rapid;
+      const bool rapid = is_free(program_.moves[i]);
       if (!rapid) only_rapids = false;
       for (const Sample& sample : samples_.of_move(i, tool_length)) {
         stretch.next(sample, only_rapids);
@@ -254,6 +260,7 @@ class Matcher {
 
   const ReadBack& program_;
   const ReferencePath& input_;
+  const PathMatchSettings settings_;
   const Progress& progress_;
   Metric metric_;
   ProgramSamples samples_;

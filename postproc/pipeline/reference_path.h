@@ -36,8 +36,10 @@ class ReferencePath {
   /// @pre like.interpolation is not great_circle
   CutterLocation location_of_words(const AxisWords& words, const PathPoint& like) const;
 
- private:
+  /// The input's axis words on the way.   @pre as for at()
   AxisWords words_at(std::size_t segment, double s) const;
+
+ private:
   JointVector joints_of(const AxisWords& words, double compensation) const;
 
   const ToolPath& path_;

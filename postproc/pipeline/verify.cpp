@@ -224,7 +224,6 @@ class DeviationCheck {
       for (std::size_t i = 0; i < read_.moves.size(); ++i) {
         if (in_.map[i].role == MoveRole::path) {
           compare_block(i);
-          compare_beam(i);
         }
         compare_joints(i);
         if (i % 4096 == 0 &&
@@ -237,9 +236,12 @@ class DeviationCheck {
       checks.push_back(
           axis_.check("axis_deviation", degrees_from_radians(machine_.tolerance.axis), "deg"));
       add_round_trip(checks);
-      if (has_beam(machine_))
+      if (has_beam(machine_)) {
+        compare_beam();
+        checks.push_back(event_.check("event_position", machine_.tolerance.event, "mm"));
         checks.push_back(rule("beam_as_programmed", wrong_beam_, "moves", wrong_beam_line_,
                               "the beam is on where the input has it off, or off where it is on"));
+      }
     }
     if (has_beam(machine_)) check_beam_in_links(checks);
     Check complete;
@@ -316,10 +318,67 @@ class DeviationCheck {
     }
   }
 
-  void compare_beam(std::size_t i) {
-    if (read_.moves[i].beam == in_.reference.path().points[in_.map[i].segment].beam) return;
-    wrong_beam_ += 1.0;
-    if (wrong_beam_line_ == 0) wrong_beam_line_ = read_.moves[i].line;
+  bool wanted_beam(std::size_t i) const {
+    return in_.reference.path().points[in_.map[i].segment].beam;
+  }
+
+  double tip_length(std::size_t i) const {
+    const LineMapEntry& e = in_.map[i];
+    return in_.reference.length(e.segment) * (e.to_share - e.from_share);
+  }
+
+  bool is_path(std::size_t i) const {
+    return i < read_.moves.size() && in_.map[i].role == MoveRole::path;
+  }
+
+  // Every command that changes the beam takes effect between the command and its latency later, at
+  // the planned speed; a stretch on which the beam is not as the input has it is its lead.
+  void compare_beam() {
+    bool beam = false;
+    std::size_t event = 0;
+    for (std::size_t i = 0; i < read_.moves.size(); ++i) {
+      for (; event < read_.events.size() && read_.events[event].before <= i; ++event) {
+        const ReadBackEvent& e = read_.events[event];
+        if (e.beam != beam) beam_command(event, i);
+        beam = e.beam;
+      }
+      if (!is_path(i) || read_.moves[i].beam == wanted_beam(i)) continue;
+      double length = 0.0;
+      const std::size_t begin = i;
+      const bool on = read_.moves[i].beam;
+      for (; is_path(i) && read_.moves[i].beam == on && wanted_beam(i) != on; ++i)
+        length += tip_length(i);
+      --i;
+      // A lead ends where the input changes the beam, or with the run.
+      const bool is_lead = is_path(i + 1) ? wanted_beam(i + 1) == on : !on;
+      if (is_lead && length <= machine_.tolerance.event) continue;
+      wrong_beam_ += static_cast<double>(i - begin + 1);
+      if (wrong_beam_line_ == 0) wrong_beam_line_ = read_.moves[begin].line;
+    }
+  }
+
+  double latency_of(const std::string& event) const {
+    for (const auto& row : machine_.process.events)
+      if (row.event == event) return row.latency;
+    return 0.0;
+  }
+
+  void beam_command(std::size_t event, std::size_t i) {
+    const ReadBackEvent& e = read_.events[event];
+    double lead = 0.0;
+    for (std::size_t k = i; is_path(k) && read_.moves[k].beam != wanted_beam(k); ++k)
+      lead += tip_length(k);
+    double left = latency_of(e.name);
+    // The tool stands still meanwhile.
+    for (std::size_t k = event + 1; k < read_.events.size() && read_.events[k].before == i; ++k)
+      left -= read_.events[k].seconds;
+    double way = 0.0;
+    for (std::size_t k = i; is_path(k) && left > 0.0; ++k) {
+      const double time = read_.moves[k].duration;
+      way += tip_length(k) * (time > left ? left / time : 1.0);
+      left -= time;
+    }
+    event_.see(std::max(lead, std::abs(way - lead)), e.line, i < times_.size() ? times_[i] : 0.0);
   }
 
   // So many that the allowance between samples is at most a fiftieth of the tolerance.
@@ -348,7 +407,7 @@ class DeviationCheck {
       const double unit = is_rotary(axis) || !inch ? 1.0 : kMillimetresPerInch;
       const double half_digit = 0.5 * std::pow(10.0, -digits) * unit;
       checks.push_back(joints_[static_cast<std::size_t>(j)].check(
-          "round_trip." + axis.name, half_digit * (1.0 + 1e-6), unit_of(axis)));
+          "round_trip." + axis.name, half_digit * (1.0 + 1e-4), unit_of(axis)));
     }
   }
 
@@ -368,7 +427,7 @@ class DeviationCheck {
   const MachineDefinition& machine_;
   const DeviationInput& in_;
   std::vector<double> times_;
-  Worst tip_, axis_;
+  Worst tip_, axis_, event_;
   std::array<Worst, kMaxJoints> joints_;
   double wrong_beam_ = 0.0;
   std::uint32_t wrong_beam_line_ = 0;

@@ -42,6 +42,18 @@ Json diagnostic_json(const Diagnostic& d) {
           {"code", d.code},           {"text", d.text}};
 }
 
+Json cut_json(const CutSummary& c) {
+  return {{"label", c.label},
+          {"input_lines", {c.first_line, c.last_line}},
+          {"length_mm", number(c.length)},
+          {"closed", c.phases.closed},
+          {"lead_in_mm", number(c.phases.lead_in)},
+          {"contour_mm", number(c.phases.contour)},
+          {"over_burn_mm", number(c.phases.over_burn)},
+          {"lead_out_mm", number(c.phases.lead_out)},
+          {"micro_joints", c.phases.micro_joints}};
+}
+
 Json axis_json(const AxisSummary& a) {
   // Acceleration and jerk of a program at level geometry are the controller's: null, not zero.
   return {{"name", a.name},
@@ -111,9 +123,7 @@ std::string report_json(const Conversion& c, const ReportContext& context) {
   constexpr std::size_t kMostCuts = 10000;
   Json cuts = Json::array();
   for (std::size_t i = 0; i < std::min(c.cuts.size(), kMostCuts); ++i)
-    cuts.push_back({{"label", "cut " + std::to_string(i + 1)},
-                    {"input_lines", {c.cuts[i].first_line, c.cuts[i].last_line}},
-                    {"length_mm", number(c.cuts[i].length)}});
+    cuts.push_back(cut_json(c.cuts[i]));
   j["corners"] = Json::array();  // this version smooths none
   j["cuts"] = std::move(cuts);
   j["time_s"] = {{"programmed", number(c.programmed_time)},

@@ -1,3 +1,4 @@
+#include "postproc/pipeline/cuts.h"
 #include "postproc/pipeline/path_match.h"
 
 #include <catch2/catch.hpp>
@@ -10,6 +11,13 @@ using namespace smoothpost;
 using namespace smoothpost::test;
 
 namespace {
+
+/// The path as a conversion sees it: everything that does not cut is a link.
+ToolPath with_links(ToolPath path) {
+  find_cuts(path, {});
+  return path;
+}
+
 
 const std::string kProgram =
     "%\nM428\nG21 G90 G94\nG0 X0 Y0 Z20 A0 C0\nG0 Z1\nG1 X8 F600\nG1 X8 Y5\nG1 X0 Y5 A-20 C10\nG1 "
@@ -34,7 +42,8 @@ struct Fixture {
   }
 
   PathMatch match(const ReadBack& read) const {
-    const ReferencePath reference(in.input.path, in.input.frames);
+    const ToolPath cut_path = with_links(in.input.path);
+  const ReferencePath reference(cut_path, in.input.frames);
     return match_paths(read, chain, reference,
                        {in.machine.tolerance.tip, in.machine.tolerance.axis}, {});
   }
@@ -106,7 +115,7 @@ TEST_CASE("match_paths: an additional cut, a missing end and a missing second cu
   CHECK(match.input_line >= 12);
 
   ReadBack first_only = f.conversion.read;
-  first_only.moves.resize(f.end_of_line(10) + 1);
+  first_only.moves.resize(f.end_of_line(9) + 1);
   CHECK_FALSE(f.match(first_only).matched);
 }
 
