@@ -40,6 +40,7 @@ struct CanonicalMotion {
   MotionKind kind = MotionKind::feed;
   bool is_arc = false;
   bool tcp = false;               ///< tool-centre-point mode: XYZ is the tip in the workpiece
+  bool axis_vector = false;       ///< tcp with the tool axis given as a vector
   bool machine_position = false;  ///< G53, G28, G30: a place of the input machine, not of the part
   AxisMask unknown_start = 0;     ///< words that the program has not yet given a value
   AxisMask unknown_end = 0;
@@ -49,6 +50,8 @@ struct CanonicalMotion {
   double duration = 0.0;  ///< s at the programmed feed; 0 for a rapid
   AxisWords start{};
   AxisWords end{};
+  Vec3 start_axis = Vec3::UnitZ();  ///< unit, tip to spindle, in W; zero: unknown
+  Vec3 end_axis = Vec3::UnitZ();
   ArcGeometry arc;
 };
 
