@@ -16,11 +16,6 @@ constexpr LetterMask kCentreLetters = letter_bit('I') | letter_bit('J') | letter
 bool is_arc(GCode motion) { return motion == 20 || motion == 30; }
 bool is_whole(double value) { return std::abs(value - std::round(value)) <= 1e-4; }
 
-/// Codes of group 0 that use the axis words themselves.
-bool takes_axes(GCode code) {
-  return code == 100 || code == 280 || code == 300 || code == 520 || code == 920;
-}
-
 }  // namespace
 
 AxisMask axis_mask(LetterMask letters) {
@@ -34,7 +29,11 @@ AxisMask axis_mask(LetterMask letters) {
 
 BlockPlanner::BlockPlanner(const InterpreterSettings& settings, const EventMatcher& matcher,
                            BlockReader& reader, DiagnosticLog& log)
-    : settings_(settings), matcher_(matcher), reader_(reader), log_(log) {
+    : settings_(settings),
+      matcher_(matcher),
+      reader_(reader),
+      log_(log),
+      dialect_(reader.dialect()) {
   for (std::size_t i = 0; i < kAxisLetters.size(); ++i) {
     const bool rotary = i >= 3 && i < 6;
     const bool has = (settings.axes >> i) & 1;
@@ -64,25 +63,32 @@ TextPlace BlockPlanner::at(const BlockWords& block, GGroup group) const {
 bool BlockPlanner::plan(const BlockWords& block, const ModalState& modal) {
   good_ = !block.bad;
   plan_.motion = kNoCode;
-  plan_.taken = 0;
+  plan_.taken = plan_.vector = 0;
   plan_.whole_comment = false;
   plan_.action_count = 0;
   plan_.axes = axis_mask(block.letters);
   if ((block.letters & kAxisLetterMask & ~allowed_axes_) != 0) check_axes(block);
   // What is wrong with its words was told already; what they would mean is a guess.
   if (block.bad) return false;
+  if (dialect_ != InputDialect::linuxcnc) find_vector(block, modal);
   choose_motion(block, modal);
   constexpr LetterMask kPlain = kAxisLetterMask | letter_bit('F');
-  const bool plain = block.m_count == 0 && (block.letters & ~kPlain) == 0;
+  const bool plain = block.m_count == 0 && (block.letters & ~kPlain) == 0 && block.statements == 0;
   if (plain && block.code(GGroup::non_modal) == kNoCode) {
     if (block.has('F')) check_values(block);
     return good_;
   }
   check_values(block);
-  check_arc_words(block);
-  const LetterMask process =
+  if (plan_.vector != 0) {
+    check_vector(block, modal);
+  } else {
+    check_arc_words(block);
+  }
+  LetterMask process =
       block.letters & ~kPlain & ~kCentreLetters & ~letter_bit('S') & ~letter_bit('T');
-  plan_process(block, process & ~letters_of_g_codes(block));
+  process &= ~letters_of_g_codes(block);
+  if (dialect_ != InputDialect::linuxcnc) process &= ~letters_of_dialect(block, modal);
+  plan_process(block, process);
   if (good_) check_non_modal(block, modal);
   return good_;
 }
@@ -118,7 +124,7 @@ void BlockPlanner::check_axes(const BlockWords& block) {
 void BlockPlanner::choose_motion(const BlockWords& block, const ModalState& modal) {
   const GCode mode0 = block.code(GGroup::non_modal);
   const GCode mode1 = block.code(GGroup::motion);
-  const bool covets = takes_axes(mode0);
+  const bool covets = takes_axes(block);
   const bool by_value = block.code(GGroup::length_offset) == 431;
   if (mode1 != kNoCode) {
     if (mode1 == 800) {
@@ -128,14 +134,17 @@ void BlockPlanner::choose_motion(const BlockWords& block, const ModalState& moda
       }
     } else if (covets) {
       refuse("NC211",
-             g_code_text(mode0) + " and " + g_code_text(mode1) +
+             (mode0 == kNoCode ? std::string("the frame") : g_code_text(mode0)) + " and " +
+                 g_code_text(mode1) +
                  " both use the axis words of the block; write them on two lines",
              at(block, GGroup::motion));
     } else {
       plan_.motion = mode1;
     }
   } else if (!covets && plan_.axes != 0 && !by_value) {
-    if (modal.motion == kNoCode || modal.motion == 800) {
+    if (mode0 == 530 && dialect_ != InputDialect::siemens && dialect_ != InputDialect::linuxcnc) {
+      plan_.motion = 0;  // always a rapid there
+    } else if (modal.motion == kNoCode || modal.motion == 800) {
       refuse("NC209", "axis words without a motion mode: no G0, G1, G2 or G3 is active here",
              reader_.place(block, block.first_piece));
     } else {
@@ -143,6 +152,8 @@ void BlockPlanner::choose_motion(const BlockWords& block, const ModalState& moda
     }
   } else if (plan_.axes == 0 && !covets && (block.letters & kCentreLetters) != 0 &&
              is_arc(modal.motion)) {
+    plan_.motion = modal.motion;
+  } else if (!covets && plan_.vector != 0) {
     plan_.motion = modal.motion;
   }
 }
@@ -170,8 +181,9 @@ void BlockPlanner::check_values(const BlockWords& block) {
   at_least_zero('F');
   at_least_zero('S');
   at_least_zero('T');
-  at_least_zero('H');
+  if (dialect_ != InputDialect::siemens) at_least_zero('H');
   for (const char letter : {'T', 'H'}) {
+    if (letter == 'H' && dialect_ == InputDialect::siemens) continue;
     if (block.has(letter) && (!is_whole(block[letter]) || block[letter] > 1e9)) {
       refuse("NC223",
              joined({std::string_view(&letter, 1), shortest_text(block[letter]),
@@ -199,27 +211,22 @@ void BlockPlanner::check_arc_words(const BlockWords& block) {
                ": the turns of an arc are a whole number from 1 to 1000000",
            at(block, 'P'));
   }
+  if (block.has(kCircleTurns) &&
+      (!is_whole(block[kCircleTurns]) || block[kCircleTurns] < -0.5 || block[kCircleTurns] > 1e6)) {
+    refuse("NC222", "TURN: the further turns of an arc are a whole number from 0 to 1000000",
+           at(block, kCircleTurns));
+  }
 }
 
 void BlockPlanner::check_non_modal(const BlockWords& block, const ModalState& modal) {
   const GCode code = block.code(GGroup::non_modal);
   const TextPlace place = at(block, GGroup::non_modal);
   if (code == 40) {
-    if (!block.has('P') || block['P'] < 0.0) {
-      refuse("NC217", "G4 needs P with the seconds to wait, from 0", place);
-    } else if (is_arc(plan_.motion)) {
-      refuse("NC217", "G4 and an arc both use P; write them on two lines", place);
-    }
+    check_dwell(block);
   } else if (code == 100) {
-    check_g10(block);
-  } else if (code == 530) {
-    const GCode distance = block.code(GGroup::distance);
-    if (plan_.motion != 0 && plan_.motion != 10) {
-      if (modal.motion == kRefusedMotion) return;
-      refuse("NC216", "G53 needs G0 or G1 and axis words in its block", place);
-    } else if (distance == 910 || (distance == kNoCode && modal.incremental)) {
-      refuse("NC216", "G53 cannot be incremental; write G90", place);
-    }
+    if (dialect_ == InputDialect::linuxcnc || check_fanuc_g10(block)) check_g10(block);
+  } else if (code == 530 || code == 1530 || block.says(SiemensWord::supa)) {
+    check_machine_position(block, modal);
   } else if ((code == 520 || code == 920) && plan_.axes == 0 && !plan_.whole_comment) {
     refuse("NC219", g_code_text(code) + " needs axis words (process words have no zero to shift)",
            place);
@@ -269,11 +276,13 @@ void BlockPlanner::plan_m(const BlockWords& block, int slot, LetterMask& free) {
   action.m = block.m[index];
   action.rank = m_rank(action.m);
   action.piece = block.m_piece[index];
-  if (action.m == 2 || action.m == 30) {
+  const bool siemens = dialect_ == InputDialect::siemens;
+  if (action.m == 2 || action.m == 30 || (siemens && action.m == 17)) {
     action.kind = ProcessAction::Kind::program_end;
     return add_action(action);
   }
-  if (settings_.has_tcp && (action.m == 428 || action.m == 429)) {
+  if (settings_.has_tcp && dialect_ == InputDialect::linuxcnc &&
+      (action.m == 428 || action.m == 429)) {
     action.kind = action.m == 428 ? ProcessAction::Kind::tcp_on : ProcessAction::Kind::tcp_off;
     return add_action(action);
   }
@@ -336,7 +345,7 @@ void BlockPlanner::plan_letters(const BlockWords& block, LetterMask free) {
     const std::uint32_t piece = block.piece[static_cast<std::size_t>(letter_index(letter))];
     if (letter != 'E') {
       refuse("NC215",
-             joined({"no code of this block uses the word ", std::string_view(&letter, 1),
+             joined({"no code of this block uses the word ", address_text(letter),
                      "; remove it or write the code that it belongs to"}),
              reader_.place(block, piece));
       continue;

@@ -26,6 +26,7 @@ struct BlockPlan {
 
   GCode motion = kNoCode;      ///< 0, 10, 20, 30; kNoCode: none
   AxisMask axes = 0;           ///< axis words of the block
+  LetterMask vector = 0;       ///< words of the block that give the tool axis
   LetterMask taken = 0;        ///< letters that were handed to a comment and have no meaning here
   bool whole_comment = false;  ///< G92 or G52 of unmapped words only
   std::array<ProcessAction, kMaxActions> actions;
@@ -50,7 +51,14 @@ class BlockPlanner {
   void check_g10(const BlockWords& block);
   void check_values(const BlockWords& block);
   void check_arc_words(const BlockWords& block);
+  bool takes_axes(const BlockWords& block) const;
+  void find_vector(const BlockWords& block, const ModalState& modal);
+  void check_vector(const BlockWords& block, const ModalState& modal);
+  void check_dwell(const BlockWords& block);
+  void check_machine_position(const BlockWords& block, const ModalState& modal);
+  bool check_fanuc_g10(const BlockWords& block);
   LetterMask letters_of_g_codes(const BlockWords& block) const;
+  LetterMask letters_of_dialect(const BlockWords& block, const ModalState& modal) const;
   void plan_process(const BlockWords& block, LetterMask free);
   void plan_m(const BlockWords& block, int slot, LetterMask& free);
   void plan_letters(const BlockWords& block, LetterMask free);
@@ -67,6 +75,7 @@ class BlockPlanner {
   LetterMask allowed_axes_ = 0;
   LetterMask axes_told_ = 0;
   bool machine_told_ = false;
+  const InputDialect dialect_;
   LetterMask letters_told_ = 0;
   std::vector<int> m_told_;
   BlockPlan plan_;

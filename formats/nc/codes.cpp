@@ -114,37 +114,134 @@ constexpr Row kRows[] = {
     {2540, GGroup::non_modal, kTcp, "Haas dynamic work offset"},
 };
 
-constexpr std::size_t kTableSize = 1000;
+/// Where the Fanuc family (Fanuc, Haas, and controls that read their programs) differs.
+constexpr Row kFanucRows[] = {
+    {50, GGroup::no_effect, kRead, "high-speed mode"},
+    {51, GGroup::no_effect, kRead, "contour control"},
+    {71, GGroup::non_modal, kLater, "cylindrical interpolation"},
+    {80, GGroup::no_effect, kRead, "look-ahead control"},
+    {90, GGroup::no_effect, kRead, "exact stop in the block"},
+    {110, GGroup::no_effect, kRead, "end of data setting"},
+    {131, GGroup::no_effect, kRead, "end of polar interpolation"},
+    {150, GGroup::no_effect, kRead, "end of polar coordinates"},
+    {160, GGroup::non_modal, kLater, "polar coordinates"},
+    {310, GGroup::motion, kLater, "skip function"},
+    {434, GGroup::length_offset, kRead, "tool-centre-point control with rotary positions"},
+    {435, GGroup::length_offset, kRead, "tool-centre-point control with tool vectors"},
+    {500, GGroup::no_effect, kRead, "end of scaling"},
+    {501, GGroup::no_effect, kRead, "end of mirror image"},
+    {510, GGroup::non_modal, kLater, "scaling"},
+    {511, GGroup::non_modal, kLater, "mirror image"},
+    {541, GGroup::work_system, kLater, "further work systems"},
+    {600, GGroup::non_modal, kLater, "positioning from one side"},
+    {620, GGroup::no_effect, kRead, "corner override"},
+    {630, GGroup::no_effect, kRead, "tapping mode"},
+    {650, GGroup::non_modal, kLater, "macro call"},
+    {660, GGroup::non_modal, kLater, "modal macro call"},
+    {670, GGroup::no_effect, kRead, "end of modal macro call"},
+    {690, GGroup::no_effect, kRead, "end of rotation"},
+    {800, GGroup::no_effect, kRead, "end of cycle"},
+    {921, GGroup::non_modal, kLater, "preset of the work system"},
+};
 
-constexpr std::array<GCodeInfo, kTableSize> make_table() {
-  std::array<GCodeInfo, kTableSize> table{};
-  for (const Row& row : kRows) {
-    if (row.code < static_cast<GCode>(kTableSize)) {
-      table[static_cast<std::size_t>(row.code)] = {row.status, row.group, row.name};
-    }
+constexpr Row kHaasRows[] = {
+    {1030, GGroup::no_effect, kRead, "limit of look-ahead"},
+    {1870, GGroup::no_effect, kRead, "smoothness"},
+    {2340, GGroup::length_offset, kRead, "tool-centre-point control"},
+};
+
+constexpr Row kSiemensRows[] = {
+    {0, GGroup::motion, kRead, "rapid"},
+    {10, GGroup::motion, kRead, "straight feed"},
+    {20, GGroup::motion, kRead, "clockwise arc"},
+    {30, GGroup::motion, kRead, "counter-clockwise arc"},
+    {40, GGroup::non_modal, kRead, "dwell"},
+    {90, GGroup::no_effect, kRead, "exact stop in the block"},
+    {170, GGroup::plane, kRead, "XY plane"},
+    {180, GGroup::plane, kRead, "ZX plane"},
+    {190, GGroup::plane, kRead, "YZ plane"},
+    {250, GGroup::non_modal, kLater, "lower limit"},
+    {260, GGroup::non_modal, kLater, "upper limit"},
+    {330, GGroup::motion, kLater, "thread"},
+    {400, GGroup::radius_compensation, kRead, "end of cutter radius compensation"},
+    {410, GGroup::radius_compensation, kLater, "cutter radius compensation"},
+    {420, GGroup::radius_compensation, kLater, "cutter radius compensation"},
+    {530, GGroup::non_modal, kRead, "machine coordinates"},
+    {540, GGroup::work_system, kRead, "work system 1"},
+    {550, GGroup::work_system, kRead, "work system 2"},
+    {560, GGroup::work_system, kRead, "work system 3"},
+    {570, GGroup::work_system, kRead, "work system 4"},
+    {580, GGroup::non_modal, kLater, "shift of single axes"},
+    {590, GGroup::non_modal, kLater, "shift of single axes"},
+    {600, GGroup::path_control, kRead, "exact stop"},
+    {620, GGroup::no_effect, kRead, "corner override"},
+    {630, GGroup::motion, kLater, "tapping"},
+    {640, GGroup::path_control, kRead, "path blending"},
+    {700, GGroup::units, kRead, "inch"},
+    {710, GGroup::units, kRead, "millimetre"},
+    {740, GGroup::non_modal, kLater, "reference point"},
+    {750, GGroup::non_modal, kLater, "fixed point"},
+    {900, GGroup::distance, kRead, "absolute words"},
+    {910, GGroup::distance, kRead, "incremental words"},
+    {930, GGroup::feed_mode, kRead, "inverse time feed"},
+    {940, GGroup::feed_mode, kRead, "feed by the minute"},
+    {950, GGroup::feed_mode, kLater, "feed by the turn"},
+    {960, GGroup::spindle_mode, kLater, "constant surface speed"},
+    {970, GGroup::spindle_mode, kRead, "spindle speed"},
+    {1100, GGroup::non_modal, kLater, "pole"},
+    {1110, GGroup::non_modal, kLater, "pole"},
+    {1120, GGroup::non_modal, kLater, "pole"},
+    {1530, GGroup::non_modal, kRead, "machine coordinates"},
+    {3310, GGroup::motion, kLater, "tapping"},
+    {3320, GGroup::motion, kLater, "tapping"},
+    {4500, GGroup::no_effect, kRead, "corner behaviour of compensation"},
+    {4510, GGroup::no_effect, kRead, "corner behaviour of compensation"},
+    {5000, GGroup::work_system, kRead, "no work offset"},
+    {6010, GGroup::no_effect, kRead, "fine exact stop"},
+    {6020, GGroup::no_effect, kRead, "coarse exact stop"},
+    {6030, GGroup::no_effect, kRead, "exact stop by set point"},
+    {6410, GGroup::path_control, kRead, "path blending"},
+    {6420, GGroup::path_control, kRead, "path blending"},
+    {6430, GGroup::path_control, kRead, "path blending"},
+    {6440, GGroup::path_control, kRead, "path blending"},
+    {6450, GGroup::path_control, kRead, "path blending"},
+    {7000, GGroup::units, kRead, "inch, feed too"},
+    {7100, GGroup::units, kRead, "millimetre, feed too"},
+};
+
+constexpr std::size_t kTableSize = 10000;
+using Table = std::array<GCodeInfo, kTableSize>;
+
+template <std::size_t N>
+void put_rows(Table& table, const Row (&rows)[N]) {
+  for (const Row& row : rows) {
+    table[static_cast<std::size_t>(row.code)] = {row.status, row.group, row.name};
   }
+}
+
+Table make_table(InputDialect dialect) {
+  Table table{};
+  if (dialect == InputDialect::siemens) {
+    put_rows(table, kSiemensRows);
+    return table;
+  }
+  put_rows(table, kRows);
+  if (dialect == InputDialect::linuxcnc) return table;
+  put_rows(table, kFanucRows);
+  if (dialect == InputDialect::haas) put_rows(table, kHaasRows);
   return table;
 }
-constexpr std::array<GCodeInfo, kTableSize> kTable = make_table();
+
 constexpr GCodeInfo kUnknown{};
 
 }  // namespace
 
-const GCodeInfo& g_code_info(GCode code) {
-  if (code >= 0 && static_cast<std::size_t>(code) < kTableSize) {
-    return kTable[static_cast<std::size_t>(code)];
-  }
-  static constexpr auto kTcpRows = [] {
-    std::array<GCodeInfo, std::size(kRows)> rows{};
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      rows[i] = {kRows[i].status, kRows[i].group, kRows[i].name};
-    }
-    return rows;
-  }();
-  for (std::size_t i = 0; i < std::size(kRows); ++i) {
-    if (kRows[i].code == code) return kTcpRows[i];
-  }
-  return kUnknown;
+const GCodeInfo& g_code_info(GCode code, InputDialect dialect) {
+  static const std::array<Table, 4> kTables = {
+      make_table(InputDialect::linuxcnc), make_table(InputDialect::fanuc),
+      make_table(InputDialect::haas), make_table(InputDialect::siemens)};
+  if (code < 0 || static_cast<std::size_t>(code) >= kTableSize) return kUnknown;
+  return kTables[static_cast<std::size_t>(dialect)][static_cast<std::size_t>(code)];
 }
 
 std::string g_code_text(GCode code) {
@@ -173,7 +270,12 @@ int m_rank(int m) {
   return group < 4 ? 5 : kOrder[group - 4];
 }
 
-const char* m_refusal(int m) {
+const char* m_refusal(int m, InputDialect dialect) {
+  if (dialect == InputDialect::siemens) return nullptr;
+  if (dialect != InputDialect::linuxcnc) {
+    const bool call = m == 96 || m == 97 || m == 98 || m == 99 || m == 198;
+    return call ? "a subroutine call or return is read in a later version" : nullptr;
+  }
   if (m == 98 || m == 99) return "a subroutine call or return is read in a later version";
   if (m == 61) return "setting the tool number without a change is read in a later version";
   if (m >= 70 && m <= 73) return "saving and restoring modal state is read in a later version";

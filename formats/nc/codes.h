@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <string>
 
+#include "formats/nc/program.h"
+
 namespace smoothpost::nc {
 
 /// A G word's number times ten: G1 is 10, G91.1 is 911.
@@ -20,6 +22,7 @@ enum class GGroup : std::uint8_t {
   units = 6,
   radius_compensation = 7,
   length_offset = 8,
+  no_effect = 9,  ///< of no group, without effect on positions: several may stand in a block
   retract = 10,
   work_system = 12,
   path_control = 13,
@@ -41,8 +44,8 @@ struct GCodeInfo {
   const char* name = "";  ///< what it is, for a message
 };
 
-/// The entry of G`code`/10; status unknown for anything that is in no table.
-const GCodeInfo& g_code_info(GCode code);
+/// The entry of G`code`/10 in a dialect; status unknown for anything that is in no table.
+const GCodeInfo& g_code_info(GCode code, InputDialect dialect);
 
 /// "G1", "G91.1".
 std::string g_code_text(GCode code);
@@ -57,6 +60,6 @@ int m_rank(int m);
 
 /// Why an M word can never be handed on as an event or a comment (program flow, saved state);
 /// nullptr when it can.
-const char* m_refusal(int m);
+const char* m_refusal(int m, InputDialect dialect);
 
 }  // namespace smoothpost::nc

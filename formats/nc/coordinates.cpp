@@ -3,6 +3,16 @@
 #include <cmath>
 
 namespace smoothpost::nc {
+namespace {
+
+Vec3 first_three(const AxisWords& words) { return {words[0], words[1], words[2]}; }
+
+void turn(const Mat3& rotation, AxisWords& words) {
+  const Vec3 turned = rotation * first_three(words);
+  for (std::size_t i = 0; i < 3; ++i) words[i] = turned[static_cast<Eigen::Index>(i)];
+}
+
+}  // namespace
 
 Coordinates::Coordinates(const InterpreterSettings& settings) : world_(settings.home) {
   for (const auto& [system, offset] : settings.work_offsets) {
@@ -13,16 +23,18 @@ Coordinates::Coordinates(const InterpreterSettings& settings) : world_(settings.
 
 void Coordinates::refresh() {
   const double angle = rotation();
-  rotated_ = angle != 0.0;
-  cosine_ = rotated_ ? std::cos(angle) : 1.0;
-  sine_ = rotated_ ? std::sin(angle) : 0.0;
+  plane_rotated_ = angle != 0.0;
+  rotated_ = plane_rotated_ || framed_;
+  cosine_ = plane_rotated_ ? std::cos(angle) : 1.0;
+  sine_ = plane_rotated_ ? std::sin(angle) : 0.0;
 }
 
 AxisWords Coordinates::world_from_program(const AxisWords& program) const {
   const AxisWords& origin = offset(system_).words;
-  AxisWords world;
-  for (std::size_t i = 0; i < world.size(); ++i) world[i] = program[i] + shift_[i];
-  if (rotated_) {
+  AxisWords world = program;
+  if (framed_) turn(frame_rotation_, world);
+  for (std::size_t i = 0; i < world.size(); ++i) world[i] += frame_shift_[i] + shift_[i];
+  if (plane_rotated_) {
     const double x = world[0];
     world[0] = cosine_ * x - sine_ * world[1];
     world[1] = sine_ * x + cosine_ * world[1];
@@ -35,22 +47,28 @@ AxisWords Coordinates::program_from_world(const AxisWords& world) const {
   const AxisWords& origin = offset(system_).words;
   AxisWords program;
   for (std::size_t i = 0; i < program.size(); ++i) program[i] = world[i] - origin[i];
-  if (rotated_) {
+  if (plane_rotated_) {
     const double x = program[0];
     program[0] = cosine_ * x + sine_ * program[1];
     program[1] = -sine_ * x + cosine_ * program[1];
   }
-  for (std::size_t i = 0; i < program.size(); ++i) program[i] -= shift_[i];
+  for (std::size_t i = 0; i < program.size(); ++i) program[i] -= frame_shift_[i] + shift_[i];
+  if (framed_) turn(frame_rotation_.transpose(), program);
   return program;
 }
 
 Vec3 Coordinates::world_from_program(const Vec3& program) const {
   const WorkOffset& active = offset(system_);
-  const Vec3 shifted = program + Vec3(shift_[0], shift_[1], shift_[2]);
-  return world_direction(shifted) + Vec3(active.words[0], active.words[1], active.words[2]);
+  const Vec3 framed = framed_ ? Vec3(frame_rotation_ * program) : program;
+  const Vec3 shifted = framed + first_three(shift_) + first_three(frame_shift_);
+  return plane_turned(shifted) + first_three(active.words);
 }
 
 Vec3 Coordinates::world_direction(const Vec3& direction) const {
+  return plane_turned(framed_ ? Vec3(frame_rotation_ * direction) : direction);
+}
+
+Vec3 Coordinates::plane_turned(const Vec3& direction) const {
   return {cosine_ * direction.x() - sine_ * direction.y(),
           sine_ * direction.x() + cosine_ * direction.y(), direction.z()};
 }
@@ -58,9 +76,9 @@ Vec3 Coordinates::world_direction(const Vec3& direction) const {
 Vec3 Coordinates::origin() const { return world_from_program(Vec3(Vec3::Zero())); }
 
 AxisMask Coordinates::unknown_after(AxisMask words) const {
-  constexpr AxisMask kXY = 3;
+  const AxisMask mixed = framed_ ? 7 : plane_rotated_ ? 3 : 0;
   auto left = static_cast<AxisMask>(unknown_ & ~words);
-  if (rotated_ && (left & kXY) != 0) left = static_cast<AxisMask>(left | kXY);
+  if ((left & mixed) != 0) left = static_cast<AxisMask>(left | mixed);
   return left;
 }
 
@@ -76,6 +94,13 @@ void Coordinates::select_system(int system) {
 
 void Coordinates::set_offset(int system, const WorkOffset& offset) {
   systems_[static_cast<std::size_t>(system)] = offset;
+  refresh();
+}
+
+void Coordinates::set_frame(const Mat3& rotation, const AxisWords& shift) {
+  frame_rotation_ = rotation;
+  frame_shift_ = shift;
+  framed_ = !rotation.isIdentity(0.0);
   refresh();
 }
 

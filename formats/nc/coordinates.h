@@ -13,7 +13,8 @@ inline constexpr int kWorkSystems = 9;
 ///
 /// With p the programmed words, s the shift (G92, G52), o and φ the offset and XY rotation of the
 /// active work system, and t the tool length offset:   world = Rz(φ)·(p + s) + o,   machine = world
-/// + t. G92 and G52 set one and the same shift, as in LinuxCNC.
+/// + t. G92 and G52 set one and the same shift, as in LinuxCNC. A siemens frame (R, f) stands in
+/// front of it: p becomes R·p + f.
 class Coordinates {
  public:
   explicit Coordinates(const InterpreterSettings& settings);
@@ -34,7 +35,7 @@ class Coordinates {
   /// The program's zero in world coordinates: Rz(φ)·s + o.
   Vec3 origin() const;
   double rotation() const { return offset(system_).rotation; }
-  /// X and Y words mix: a rotation is active.
+  /// X Y Z words mix: a rotation is active.
   bool rotated() const { return rotated_; }
 
   /// Axis letters that hang together with `words` through the XY rotation.
@@ -51,12 +52,21 @@ class Coordinates {
   void select_system(int system);
   void set_offset(int system, const WorkOffset& offset);
   void set_shift(const AxisWords& shift);
+  /// A G92, G52 or G92.3 is in force.
+  bool shift_active() const { return shift_active_; }
+  void set_shift_active(bool active) { shift_active_ = active; }
+  /// The program's frame (siemens TRANS, ROT): p' = R·p + t before the work offset; `shift` holds t
+  /// and the shifts of the other axes.
+  void set_frame(const Mat3& rotation, const AxisWords& shift);
+  const Mat3& frame_rotation() const { return frame_rotation_; }
+  const AxisWords& frame_shift() const { return frame_shift_; }
   /// G92.2 and G92.3.
   void store_shift() { stored_shift_ = shift_; }
   const AxisWords& stored_shift() const { return stored_shift_; }
 
  private:
   void refresh();
+  Vec3 plane_turned(const Vec3& direction) const;
 
   AxisWords world_{};
   AxisMask unknown_ = 0x1ff;
@@ -64,8 +74,13 @@ class Coordinates {
   AxisWords shift_{};
   AxisWords stored_shift_{};
   std::array<WorkOffset, kWorkSystems + 1> systems_{};
+  Mat3 frame_rotation_ = Mat3::Identity();
+  AxisWords frame_shift_{};
   int system_ = 1;
-  bool rotated_ = false;
+  bool shift_active_ = false;
+  bool framed_ = false;         ///< frame_rotation_ is not the identity
+  bool plane_rotated_ = false;  ///< the work system has an XY rotation
+  bool rotated_ = false;        ///< either of them
   double cosine_ = 1.0;
   double sine_ = 0.0;
 };

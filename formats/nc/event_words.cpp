@@ -52,6 +52,9 @@ class RowReader {
       const std::size_t close = text_.find(')', at_);
       if (close == std::string_view::npos) return fail("a comment is not closed");
       at_ = close + 1;
+    } else if (is_call()) {
+      row_.readable = false;
+      at_ = text_.size();
     } else if (is_letter(c)) {
       word();
     } else {
@@ -59,9 +62,31 @@ class RowReader {
     }
   }
 
+  /// MSG("{text}"), CYCLE832(...), $A_OUT[1]=1, M1=3 of a Sinumerik: written only, to the row's
+  /// end.
+  bool is_call() const {
+    const std::string_view rest = text_.substr(at_);
+    if (rest.front() == '$' || rest.front() == '_') return true;
+    if (!is_letter(rest.front()) || rest.size() < 2) return false;
+    if (is_letter(rest[1]) || rest[1] == '_') {
+      const std::size_t end = rest.find_first_of("(=[ ");
+      return end != std::string_view::npos && rest[end] != ' ' && end > 1 &&
+             std::all_of(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(end), in_name);
+    }
+    const std::size_t end = rest.find_first_not_of("0123456789", 1);
+    return end != std::string_view::npos && end > 1 && rest[end] == '=';
+  }
+  static bool in_name(char c) { return is_letter(c) || detail::is_digit(c) || c == '_'; }
+
+  /// The = and the quotes of T="{tool}" say nothing here.
+  void skip_signs() {
+    while (at_ < text_.size() && (text_[at_] == '=' || text_[at_] == '"')) ++at_;
+  }
+
   void word() {
     RowWord word;
     word.letter = upper(text_[at_++]);
+    skip_signs();
     if (at_ < text_.size() && text_[at_] == '{') {
       const std::size_t close = text_.find('}', at_);
       if (close == std::string_view::npos || close == at_ + 1) {
@@ -77,6 +102,7 @@ class RowReader {
       word.value = number.value;
       at_ += static_cast<std::size_t>(number.next - begin);
     }
+    skip_signs();
     if (word.letter == 'G' || word.letter == 'N' || word.letter == 'O') {
       row_.readable = false;
     } else if (word.letter == 'M') {
@@ -224,6 +250,10 @@ EventParameters EventMatcher::values(const EventRow& row, const BlockWords& bloc
   EventParameters values;
   for (const RowWord& word : row.words) {
     if (word.name.empty()) continue;
+    if (word.letter == 'T' && !modal.tool_name.empty()) {
+      values.emplace_back(word.name, modal.tool_name);
+      continue;
+    }
     double value = 0.0;
     if (block.has(word.letter)) {
       value = block[word.letter];

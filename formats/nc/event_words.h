@@ -35,8 +35,9 @@ struct EventRow {
 
 /// Modal values that a row's word takes when the block does not write it.
 struct ModalWords {
-  double speed = 0.0;  ///< S
-  int tool = 0;        ///< T, the selected tool
+  double speed = 0.0;     ///< S
+  int tool = 0;           ///< T, the selected tool
+  std::string tool_name;  ///< siemens T="NAME"; then `tool` is 0
 };
 
 /// What a table says of one M word (or process letter) of a block.
@@ -53,8 +54,9 @@ struct EventMatch {
 /// words does too; S and T may be modal instead. Of several the one with more M and fixed words is
 /// taken, then the one that uses more words of the block, then the first in the table (so "pierce"
 /// and "beam_on", both "M62 P0", are read as whichever the table lists first). Rows with several M
-/// words are found through the first of them. Cost: linear in the rows, only for blocks with M
-/// words.
+/// words are found through the first of them. In rows of a Sinumerik T="{tool}" is the word T;
+/// calls and long names (MSG("{text}"), $A_OUT[1]=1, M1=3) make a row that is only written. Cost:
+/// linear in the rows, only for blocks with M words.
 class EventMatcher {
  public:
   /// A failure names the rows that cannot be understood [PR111].

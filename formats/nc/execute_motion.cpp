@@ -15,6 +15,7 @@ constexpr double kNoMove = 1e-7;  // mm or rad; smaller displacements have no le
 // LinuxCNC's tolerances, by the active unit, in mm.
 constexpr double kCentreToleranceMillimetre = 0.0282843;
 constexpr double kCentreToleranceInch = 0.0028284 * kMillimetresPerInch;
+constexpr double kCentreToleranceSiemens = 0.01;  // default of CIRCLE_ERROR_LIMIT_CONST
 constexpr double kRadiusTolerance = 0.00005 * kMillimetresPerInch;
 
 bool is_rotary(std::size_t axis) { return axis >= 3 && axis < 6; }
@@ -52,15 +53,27 @@ double Executor::word_value(const BlockWords& block, std::size_t axis) const {
   return is_rotary(axis) ? radians_from_degrees(value) : value * modal_.unit;
 }
 
+/// The words of `axes` that are positions, not distances.
+AxisMask Executor::absolute_axes(const BlockWords& block, AxisMask axes) const {
+  if ((block.absolute | block.incremental) == 0) return modal_.incremental ? 0 : axes;
+  const AxisMask base = modal_.incremental ? 0 : axes;
+  const AxisMask set = axis_mask(block.absolute);
+  const AxisMask cleared = axis_mask(block.incremental);
+  return static_cast<AxisMask>((base | set) & ~cleared & axes);
+}
+
 AxisWords Executor::target(const BlockWords& block, AxisMask axes) const {
+  const AxisMask absolute = absolute_axes(block, axes);
   if (!coordinates_.rotated()) {
     AxisWords world = coordinates_.world();
     const AxisWords& origin = coordinates_.offset(coordinates_.system()).words;
     const AxisWords& shift = coordinates_.shift();
+    const AxisWords& frame = coordinates_.frame_shift();
     for (std::size_t i = 0; i < world.size(); ++i) {
       if ((axes & bit(i)) == 0) continue;
       const double value = word_value(block, i);
-      world[i] = modal_.incremental ? world[i] + value : value + shift[i] + origin[i];
+      world[i] =
+          (absolute & bit(i)) == 0 ? world[i] + value : value + (frame[i] + shift[i]) + origin[i];
     }
     return world;
   }
@@ -68,7 +81,7 @@ AxisWords Executor::target(const BlockWords& block, AxisMask axes) const {
   for (std::size_t i = 0; i < program.size(); ++i) {
     if ((axes & bit(i)) == 0) continue;
     const double value = word_value(block, i);
-    program[i] = modal_.incremental ? program[i] + value : value;
+    program[i] = (absolute & bit(i)) == 0 ? program[i] + value : value;
   }
   return coordinates_.world_from_program(program);
 }
@@ -76,13 +89,15 @@ AxisWords Executor::target(const BlockWords& block, AxisMask axes) const {
 AxisWords Executor::machine_target(const BlockWords& block, AxisMask axes) const {
   AxisWords world = coordinates_.world();
   for (std::size_t i = 0; i < world.size(); ++i) {
-    if ((axes & bit(i)) != 0) world[i] = word_value(block, i) - coordinates_.tool()[i];
+    if ((axes & bit(i)) == 0) continue;
+    // G53 of siemens keeps the tool's length: the tip goes to the place.
+    world[i] = word_value(block, i) - (is_siemens() ? 0.0 : coordinates_.tool()[i]);
   }
   return world;
 }
 
-AxisMask Executor::unknown_at_target(AxisMask axes) const {
-  return modal_.incremental ? coordinates_.unknown_after(0) : coordinates_.unknown_after(axes);
+AxisMask Executor::unknown_at_target(const BlockWords& block, AxisMask axes) const {
+  return coordinates_.unknown_after(absolute_axes(block, axes));
 }
 
 void Executor::begin_motion(const BlockWords& block, const BlockPlan& plan) {
@@ -95,6 +110,7 @@ void Executor::begin_motion(const BlockWords& block, const BlockPlan& plan) {
   motion_.duration = 0.0;
   motion_.start = coordinates_.world();
   motion_.column = reader_.place(block, block.first_piece).column;
+  motion_.axis_vector = false;
   summary_.uses_tcp = summary_.uses_tcp || modal_.tcp;
   summary_.uses_rotary = summary_.uses_rotary || (plan.axes & kRotaryAxes) != 0;
 }
@@ -103,6 +119,8 @@ void Executor::finish_motion() {
   if (offset_dirty_) announce_offset(motion_.line);
   sink_.motion(motion_);
   coordinates_.move_to(motion_.end, motion_.unknown_end);
+  // Where the rotary axes are is the machine's affair then.
+  if (motion_.axis_vector) coordinates_.forget(kRotaryAxes);
 }
 
 /// Seconds of a feed motion: G93 gives the time; else F is the speed of XYZ when one of them moves,
@@ -111,10 +129,14 @@ double Executor::duration_of(const CanonicalMotion& motion, double xyz_length,
                              const BlockWords& block) const {
   const double uvw = length(motion.start, motion.end, 6);
   const double abc = length(motion.start, motion.end, 3);
-  if (xyz_length < kNoMove && uvw < kNoMove && abc < kNoMove) return 0.0;
+  const bool turns = motion.axis_vector && motion.start_axis.dot(motion.end_axis) < 1.0 - 1e-14;
+  if (xyz_length < kNoMove && uvw < kNoMove && abc < kNoMove && !turns) return 0.0;
   if (modal_.inverse_time) return kSecondsPerMinute / block['F'];
   if (xyz_length >= kNoMove) return xyz_length / modal_.linear_feed;
-  return uvw >= kNoMove ? uvw / modal_.linear_feed : abc / modal_.angular_feed;
+  if (uvw >= kNoMove) return uvw / modal_.linear_feed;
+  if (!turns) return abc / modal_.angular_feed;
+  const double cosine = std::clamp(motion.start_axis.dot(motion.end_axis), -1.0, 1.0);
+  return std::acos(cosine) / modal_.angular_feed;
 }
 
 bool Executor::feed_given(const BlockWords& block, const BlockPlan& plan) {
@@ -141,12 +163,12 @@ void Executor::motion(const BlockWords& block, const BlockPlan& plan) {
   const bool feeds = plan.motion != 0;
   const bool arc_motion = plan.motion == 20 || plan.motion == 30;
   if (feeds && !feed_given(block, plan)) {
-    coordinates_.move_to(target(block, plan.axes), unknown_at_target(plan.axes));
+    coordinates_.move_to(target(block, plan.axes), unknown_at_target(block, plan.axes));
     return;
   }
   if (arc_motion) {
     arc(block, plan);
-  } else if (plan.axes != 0) {
+  } else if (plan.axes != 0 || plan.vector != 0) {
     straight(block, plan);
   }
 }
@@ -154,14 +176,16 @@ void Executor::motion(const BlockWords& block, const BlockPlan& plan) {
 void Executor::straight(const BlockWords& block, const BlockPlan& plan) {
   begin_motion(block, plan);
   motion_.kind = plan.motion == 0 ? MotionKind::rapid : MotionKind::feed;
-  if (block.code(GGroup::non_modal) == 530) {
+  const GCode code = block.code(GGroup::non_modal);
+  if (code == 530 || code == 1530 || block.says(SiemensWord::supa)) {
     motion_.machine_position = true;
     motion_.end = machine_target(block, plan.axes);
     motion_.unknown_end = static_cast<AxisMask>(coordinates_.unknown() & ~plan.axes);
   } else {
     motion_.end = target(block, plan.axes);
-    motion_.unknown_end = unknown_at_target(plan.axes);
+    motion_.unknown_end = unknown_at_target(block, plan.axes);
   }
+  if (!is_linuxcnc() && modal_.tcp) turn_axis(block, plan);
   if (motion_.kind == MotionKind::feed) {
     motion_.duration = duration_of(motion_, length(motion_.start, motion_.end, 0), block);
   }
@@ -175,16 +199,19 @@ void Executor::arc(const BlockWords& block, const BlockPlan& plan) {
   motion_.kind = MotionKind::feed;
   motion_.is_arc = true;
   motion_.end = target(block, plan.axes);
-  motion_.unknown_end = unknown_at_target(plan.axes);
+  motion_.unknown_end = unknown_at_target(block, plan.axes);
   const AxisWords start = coordinates_.program_from_world(motion_.start);
   const AxisWords end = coordinates_.program_from_world(motion_.end);
+  if (!is_linuxcnc() && modal_.tcp) turn_axis(block, plan);
+  // Under G43.5 I J K are refused on arcs, so they are centres here.
   const bool centre_form = block.has('I') || block.has('J') || block.has('K');
+  const char radius = is_siemens() ? kCircleRadius : 'R';
 
   std::string problem;
-  if (block.has('R') && centre_form) {
-    problem = "both R and I J K are given";
-  } else if (!block.has('R') && !centre_form) {
-    problem = "neither R nor I J K is given";
+  if (block.has(radius) && centre_form) {
+    problem = "both " + address_text(radius) + " and I J K are given";
+  } else if (!block.has(radius) && !centre_form) {
+    problem = "neither " + address_text(radius) + " nor I J K is given";
   } else if (block.has(plane.wrong_centre)) {
     problem = std::string(1, plane.wrong_centre) + " has no meaning in the plane " + plane.name;
   } else if (centre_form && modal_.arc_absolute &&
@@ -206,17 +233,23 @@ void Executor::arc(const BlockWords& block, const BlockPlan& plan) {
   words.end = {end[plane.first], end[plane.second]};
   words.clockwise = plan.motion == 20;
   words.turns = block.has('P') ? static_cast<int>(std::lround(block['P'])) : 1;
+  if (block.has(kCircleTurns)) words.turns = 1 + static_cast<int>(std::lround(block[kCircleTurns]));
   words.centre_tolerance = modal_.unit == 1.0 ? kCentreToleranceMillimetre : kCentreToleranceInch;
+  if (is_siemens()) words.centre_tolerance = kCentreToleranceSiemens;
   words.radius_tolerance = kRadiusTolerance;
   PlaneArc found;
   if (centre_form) {
     const double i = block.has(plane.first_centre) ? block[plane.first_centre] * modal_.unit : 0.0;
     const double j =
         block.has(plane.second_centre) ? block[plane.second_centre] * modal_.unit : 0.0;
-    const PlanePoint base = modal_.arc_absolute ? PlanePoint{} : words.start;
-    found = arc_by_centre(words, {base.first + i, base.second + j});
+    const auto is_absolute = [&](char letter) {
+      return modal_.arc_absolute || (block.absolute & letter_bit(letter)) != 0;
+    };
+    found =
+        arc_by_centre(words, {i + (is_absolute(plane.first_centre) ? 0.0 : words.start.first),
+                              j + (is_absolute(plane.second_centre) ? 0.0 : words.start.second)});
   } else {
-    found = arc_by_radius(words, block['R'] * modal_.unit);
+    found = arc_by_radius(words, block[radius] * modal_.unit);
   }
   if (!found.problem.empty()) {
     log_.error("NC221", code + ": " + found.problem, at(block, GGroup::motion));

@@ -13,12 +13,16 @@ constexpr std::size_t kZ = 2;
 AxisMask bit(std::size_t axis) { return static_cast<AxisMask>(1u << axis); }
 
 /// G54 is 1, G59.3 is 9.
-int system_of(GCode code) { return code <= 590 ? (code - 540) / 10 + 1 : 6 + (code - 590); }
+int system_of(GCode code) {
+  if (code == 5000) return 0;  // G500 of siemens: no offset
+  return code <= 590 ? (code - 540) / 10 + 1 : 6 + (code - 590);
+}
 
 }  // namespace
 
 void Executor::tool_length(const BlockWords& block) {
   const GCode code = block.code(GGroup::length_offset);
+  if (!is_linuxcnc()) set_tcp_by_offset(code);
   if (code == 490) return set_tool_length(0.0, 0, block.line);
   if (code == 431) {
     const AxisMask axes = axis_mask(block.letters);
@@ -34,8 +38,9 @@ void Executor::tool_length(const BlockWords& block) {
   if (tool == 0 && block.has('H')) return set_tool_length(0.0, 0, block.line);
   if (tool == 0) {
     log_.error("PR104",
-               "G43 without H, and no tool was changed to before: which length is meant is not "
-               "known; write H with the tool's number or a tool change before it",
+               g_code_text(code) +
+                   " without H, and no tool was changed to before: which length is meant is not "
+                   "known; write H with the tool's number or a tool change before it",
                at(block, GGroup::length_offset));
     return;
   }
@@ -43,7 +48,7 @@ void Executor::tool_length(const BlockWords& block) {
   if (found == settings_.tool_lengths.end()) {
     const std::string number = std::to_string(tool);
     log_.error("PR102",
-               "G43 needs the length of tool " + number +
+               g_code_text(code) + " needs the length of tool " + number +
                    ", which the program does not contain; "
                    "give it by --tool " +
                    number + "=LENGTH (mm)",
@@ -110,7 +115,7 @@ void Executor::go_home(const BlockWords& block, const BlockPlan& plan, HomePosit
     begin_motion(block, plan);
     motion_.machine_position = true;
     motion_.end = target(block, plan.axes);
-    motion_.unknown_end = unknown_at_target(plan.axes);
+    motion_.unknown_end = unknown_at_target(block, plan.axes);
     finish_motion();
   }
   const AxisMask moved = plan.axes != 0 ? plan.axes : settings_.axes;
@@ -198,6 +203,7 @@ void Executor::shift_zero(const BlockWords& block, const BlockPlan& plan) {
   }
   const GCode code = block.code(GGroup::non_modal);
   coordinates_.set_shift(shift);
+  coordinates_.set_shift_active(code == 520 || code == 920 || code == 923);
   if (code == 520 || code == 920 || code == 921) coordinates_.store_shift();
   offset_dirty_ = true;
 }

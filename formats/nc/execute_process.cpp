@@ -43,13 +43,8 @@ void Executor::comment(const BlockWords& block) {
   const bool parentheses = text.front() == '(';
   text = trimmed(parentheses ? text.substr(1, text.size() - 2) : text.substr(1));
   if (parentheses && begins_with(text, "MSG,")) {
-    ProcessEvent event;
-    event.name = event_name::kMessage;
-    event.parameters.emplace_back("text", std::string(trimmed(text.substr(4))));
-    event.line = block.line;
-    event.column = reader_.place(block, block.comment_piece).column;
-    sink_.event(event);
-    return;
+    return message(trimmed(text.substr(4)), block.line,
+                   reader_.place(block, block.comment_piece).column);
   }
   if (parentheses && is_active(text)) {
     log_.note("NC231", "an active comment is kept as plain text; it does nothing here",
@@ -58,9 +53,24 @@ void Executor::comment(const BlockWords& block) {
   if (!text.empty()) sink_.comment(text, block.line);
 }
 
+void Executor::message(std::string_view text, std::uint32_t line, std::uint32_t column) {
+  ProcessEvent event;
+  event.name = event_name::kMessage;
+  event.parameters.emplace_back("text", std::string(text));
+  event.line = line;
+  event.column = column;
+  sink_.event(event);
+}
+
 void Executor::speed_and_tool(const BlockWords& block, const BlockPlan& plan) {
   if (block.has('T') && (plan.taken & letter_bit('T')) == 0) {
     modal_.words.tool = static_cast<int>(std::lround(block['T']));
+    if (is_siemens()) {
+      const std::string_view text = reader_.raw(block.piece[letter_index('T')]);
+      const std::size_t quote = text.find('"');
+      modal_.words.tool_name =
+          quote == std::string_view::npos ? "" : text.substr(quote + 1, text.size() - quote - 2);
+    }
   }
   if (!block.has('S') || (plan.taken & letter_bit('S')) != 0) return;
   const bool changed = block['S'] != modal_.words.speed;
@@ -113,10 +123,7 @@ void Executor::act_on_row(const BlockWords& block, const ProcessAction& action) 
       if (word.letter == 'S' && !word.name.empty()) modal_.spindle_row = action.row;
     }
   }
-  if (action.m == 6) {
-    modal_.spindle_tool = modal_.words.tool;
-    summary_.tools.push_back(modal_.spindle_tool);
-  }
+  if (action.m == 6) change_tool(block);
 }
 
 void Executor::emit_event(const EventRow& row, const BlockWords& block, std::uint32_t piece) {
@@ -143,10 +150,7 @@ void Executor::comment_words(const BlockWords& block, const ProcessAction& actio
     if (i == action.piece || letter || shift) text += " " + reader_.text(i);
   }
   sink_.comment(text, block.line);
-  if (action.m == 6) {
-    modal_.spindle_tool = modal_.words.tool;
-    summary_.tools.push_back(modal_.spindle_tool);
-  }
+  if (action.m == 6) change_tool(block);
   if (m_group(action.m) == 7) modal_.spindle_row = nullptr;
 }
 
@@ -159,11 +163,20 @@ void Executor::set_tcp(bool on) {
   modal_.tcp = on;
   bool at_zero = (coordinates_.unknown() & kRotary & settings_.axes) == 0;
   for (std::size_t i = 3; i < 6; ++i) at_zero = at_zero && coordinates_.world()[i] == 0.0;
+  modal_.by_vector = false;
+  modal_.axis = Vec3::Zero();
   if (!at_zero) coordinates_.forget(kLinear);
 }
 
 void Executor::dwell(const BlockWords& block) {
-  if (block.code(GGroup::non_modal) == 40) sink_.dwell(block['P'], block.line);
+  if (block.code(GGroup::non_modal) != 40) return;
+  if (is_linuxcnc()) return sink_.dwell(block['P'], block.line);
+  if (is_siemens()) return sink_.dwell(block['F'], block.line);
+  constexpr double kMillisecond = 1e-3;
+  const char letter = block.has('P') ? 'P' : block.has('X') ? 'X' : 'U';
+  const std::uint32_t piece = block.piece[static_cast<std::size_t>(letter_index(letter))];
+  const bool milliseconds = letter == 'P' && !reader_.has_point(piece);
+  sink_.dwell(block[letter] * (milliseconds ? kMillisecond : 1.0), block.line);
 }
 
 }  // namespace smoothpost::nc

@@ -5,6 +5,15 @@
 #include "kernels/core/units.h"
 
 namespace smoothpost::nc {
+namespace {
+
+std::unique_ptr<WordValues> make_values(InputDialect dialect, const InterpreterSettings& settings,
+                                        ControllerState state) {
+  if (dialect == InputDialect::siemens) return std::make_unique<SiemensValues>(state.modal);
+  return std::make_unique<Rs274Values>(settings, state);
+}
+
+}  // namespace
 
 Executor::Executor(const Program& program, const InterpreterSettings& settings,
                    const EventMatcher& matcher, CanonicalSink& sink)
@@ -13,11 +22,15 @@ Executor::Executor(const Program& program, const InterpreterSettings& settings,
       matcher_(matcher),
       sink_(sink),
       log_(program.file_name),
-      reader_(program, log_),
-      planner_(settings, matcher, reader_, log_),
       coordinates_(settings),
+      values_(make_values(program.dialect, settings,
+                          {coordinates_, modal_, first_home_, second_home_})),
+      reader_(program, settings, *values_, log_),
+      planner_(settings, matcher, reader_, log_),
       systems_used_(kWorkSystems + 1, false) {
-  modal_.unit = settings.inch_default ? kMillimetresPerInch : 1.0;
+  modal_.unit = modal_.feed_unit = settings.inch_default ? kMillimetresPerInch : 1.0;
+  // The motion mode after reset; RS274NGC has none.
+  if (!is_linuxcnc()) modal_.motion = is_siemens() ? 10 : 0;
   first_home_.machine = second_home_.machine = settings.home;
 }
 
@@ -37,11 +50,12 @@ Result<InterpretationSummary> Executor::run() {
     }
   }
   if (!summary_.ended) {
-    log_.warning(
-        "NC229",
-        "the program ends without M2, M30 or a closing %: it is read to its last line, but "
-        "LinuxCNC refuses such a file",
-        {static_cast<std::uint32_t>(program_.blocks.size()), 0});
+    log_.warning("NC229",
+                 is_linuxcnc()
+                     ? "the program ends without M2, M30 or a closing %: it is read to its last "
+                       "line, but LinuxCNC refuses such a file"
+                     : "the program ends without M2 or M30: it is read to its last line",
+                 {static_cast<std::uint32_t>(program_.blocks.size()), 0});
   }
   if (log_.has_error()) return Result<InterpretationSummary>::failure(log_.take());
   return {std::move(summary_), log_.take()};
@@ -71,12 +85,20 @@ void Executor::block(const BlockWords& block) {
 /// The order of execution on one line that the LinuxCNC manual gives.
 void Executor::act(const BlockWords& block, const BlockPlan& plan) {
   if (block.comment_piece != BlockWords::kNone) comment(block);
+  if (!is_linuxcnc()) {
+    set_units(block);
+    warn_dialect(block);
+  }
   set_feed_mode(block);
   set_feed(block);
   speed_and_tool(block, plan);
   process(block, plan, false);
   dwell(block);
-  set_units(block);
+  if (is_linuxcnc()) set_units(block);
+  if (is_siemens()) {
+    if (block.has('D')) tool_edge(block);
+    if (block.statements != 0) statements(block);
+  }
   if (block.code(GGroup::length_offset) != kNoCode) tool_length(block);
   if (block.code(GGroup::work_system) != kNoCode) work_system(block);
   set_modes(block);
@@ -94,18 +116,21 @@ void Executor::set_feed_mode(const BlockWords& block) {
   modal_.inverse_time = inverse;
 }
 
-/// F is taken in the units that are active before this line's G20 or G21, as the controller does.
+/// F is taken in the units that are active before this line's G20 or G21, as LinuxCNC does; the
+/// other controls take the new unit.
 void Executor::set_feed(const BlockWords& block) {
   if (!block.has('F') || modal_.inverse_time) return;
-  modal_.linear_feed = block['F'] * modal_.unit / kSecondsPerMinute;
+  if (is_siemens() && block.code(GGroup::non_modal) == 40) return;  // seconds
+  modal_.linear_feed = block['F'] * modal_.feed_unit / kSecondsPerMinute;
   modal_.angular_feed = radians_from_degrees(block['F']) / kSecondsPerMinute;
 }
 
 void Executor::set_units(const BlockWords& block) {
   const GCode code = block.code(GGroup::units);
   if (code == kNoCode) return;
-  const double unit = code == 200 ? kMillimetresPerInch : 1.0;
-  if (unit != modal_.unit && block.has('F') && !modal_.inverse_time) {
+  const bool inch = code == 200 || code == 700 || code == 7000;
+  const double unit = inch ? kMillimetresPerInch : 1.0;
+  if (is_linuxcnc() && unit != modal_.unit && block.has('F') && !modal_.inverse_time) {
     log_.warning("NC227",
                  "F stands in the block that changes the unit: the controller takes it in the old "
                  "unit; write " +
@@ -113,6 +138,8 @@ void Executor::set_units(const BlockWords& block) {
                  at(block, 'F'));
   }
   modal_.unit = unit;
+  // G70 and G71 of siemens leave the feed in the control's unit.
+  if (code != 700 && code != 710) modal_.feed_unit = unit;
 }
 
 void Executor::set_modes(const BlockWords& block) {
@@ -130,7 +157,11 @@ void Executor::recover(const BlockWords& block) {
   set_feed_mode(block);
   set_feed(block);
   const GCode unit = block.code(GGroup::units);
-  if (unit == 200 || unit == 210) modal_.unit = unit == 200 ? kMillimetresPerInch : 1.0;
+  if (unit != kNoCode) {
+    const bool inch = unit == 200 || unit == 700 || unit == 7000;
+    modal_.unit = inch ? kMillimetresPerInch : 1.0;
+    if (unit != 700 && unit != 710) modal_.feed_unit = modal_.unit;
+  }
   const GCode plane = block.code(GGroup::plane);
   if (plane == 170 || plane == 180 || plane == 190) modal_.plane = plane;
   const GCode distance = block.code(GGroup::distance);
@@ -139,17 +170,22 @@ void Executor::recover(const BlockWords& block) {
   if (arc_distance != kNoCode) modal_.arc_absolute = arc_distance == 901;
   const GCode mode = block.code(GGroup::motion);
   if (mode != kNoCode) {
-    modal_.motion = g_code_info(mode).status == GStatus::read ? mode : kRefusedMotion;
+    const bool read = g_code_info(mode, program_.dialect).status == GStatus::read;
+    modal_.motion = read ? mode : kRefusedMotion;
   } else if (modal_.motion == kNoCode) {
     modal_.motion = kRefusedMotion;
   }
   const AxisMask axes = axis_mask(block.letters);
   if (axes != 0 && block.code(GGroup::non_modal) == kNoCode) {
-    coordinates_.move_to(target(block, axes), unknown_at_target(axes));
+    coordinates_.move_to(target(block, axes), unknown_at_target(block, axes));
   }
+  // So that what follows a refused start of a mode is judged in that mode.
+  if (is_siemens() && block.says(SiemensWord::traori)) set_tcp(true);
+  const GCode offset = block.code(GGroup::length_offset);
+  if (!is_linuxcnc() && offset != kNoCode) set_tcp_by_offset(offset);
   for (int i = 0; i < block.m_count; ++i) {
     const int m = block.m[static_cast<std::size_t>(i)];
-    if (m == 2 || m == 30) summary_.ended = true;
+    if (m == 2 || m == 30 || (is_siemens() && m == 17)) summary_.ended = true;
   }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include "formats/nc/coordinates.h"
 #include "formats/nc/interpreter.h"
 #include "formats/nc/modal_state.h"
+#include "formats/nc/word_values.h"
 
 namespace smoothpost::nc {
 
@@ -15,7 +17,7 @@ namespace smoothpost::nc {
 ///
 /// One object runs one program. What a block does in which order stands in executor.cpp, motion in
 /// execute_motion.cpp, offsets and tool length in execute_offsets.cpp, process words and comments
-/// in execute_process.cpp.
+/// in execute_process.cpp, what only other controls have in execute_dialects.cpp.
 class Executor {
  public:
   Executor(const Program& program, const InterpreterSettings& settings, const EventMatcher& matcher,
@@ -40,6 +42,7 @@ class Executor {
   void comment(const BlockWords& block);
   void comment_words(const BlockWords& block, const ProcessAction& action);
   void set_tcp(bool on);
+  void message(std::string_view text, std::uint32_t line, std::uint32_t column);
   void dwell(const BlockWords& block);
 
   void tool_length(const BlockWords& block);
@@ -53,6 +56,19 @@ class Executor {
   void warn_unknown(const BlockWords& block, AxisMask words);
   void announce_offset(std::uint32_t line);
 
+  bool is_linuxcnc() const { return program_.dialect == InputDialect::linuxcnc; }
+  bool is_siemens() const { return program_.dialect == InputDialect::siemens; }
+  void statements(const BlockWords& block);
+  void change_frame(const BlockWords& block);
+  Mat3 frame_turn(const BlockWords& block) const;
+  void tool_edge(const BlockWords& block);
+  void change_tool(const BlockWords& block);
+  void set_tcp_by_offset(GCode code);
+  void warn_dialect(const BlockWords& block);
+  void warn_once(unsigned which, std::string text, const BlockWords& block, std::uint32_t piece);
+  void turn_axis(const BlockWords& block, const BlockPlan& plan);
+  AxisMask absolute_axes(const BlockWords& block, AxisMask axes) const;
+
   void motion(const BlockWords& block, const BlockPlan& plan);
   void straight(const BlockWords& block, const BlockPlan& plan);
   void arc(const BlockWords& block, const BlockPlan& plan);
@@ -61,7 +77,7 @@ class Executor {
                      const BlockWords& block) const;
   AxisWords target(const BlockWords& block, AxisMask axes) const;
   AxisWords machine_target(const BlockWords& block, AxisMask axes) const;
-  AxisMask unknown_at_target(AxisMask axes) const;
+  AxisMask unknown_at_target(const BlockWords& block, AxisMask axes) const;
   double word_value(const BlockWords& block, std::size_t axis) const;
   void begin_motion(const BlockWords& block, const BlockPlan& plan);
   void finish_motion();
@@ -75,15 +91,17 @@ class Executor {
   const EventMatcher& matcher_;
   CanonicalSink& sink_;
   DiagnosticLog log_;
-  BlockReader reader_;
-  BlockPlanner planner_;
   ModalState modal_;
   Coordinates coordinates_;
   HomePosition first_home_;
   HomePosition second_home_;
+  std::unique_ptr<WordValues> values_;
+  BlockReader reader_;
+  BlockPlanner planner_;
   InterpretationSummary summary_;
   CanonicalMotion motion_;
   AxisMask unknown_told_ = 0;
+  unsigned warned_ = 0;       ///< bits of warn_once
   bool offset_dirty_ = true;  ///< the sink does not know the present work offset
   std::vector<bool> systems_used_;
   bool percent_or_words_seen_ = false;

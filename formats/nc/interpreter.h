@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,7 +28,11 @@ struct InterpreterSettings {
   std::map<int, WorkOffset> work_offsets;  ///< by system 1..9 (G54..G59.3); absent: 0
   AxisWords home{};      ///< where the axes stand before the program; also G28/G30
   ProcessTable process;  ///< words <-> events of the input machine
-  bool has_tcp = true;   ///< M428/M429 are known
+  bool has_tcp = true;   ///< M428/M429 are known (linuxcnc)
+  /// fanuc and haas: mm or degrees that one unit of a number without decimal point stands for: 1
+  /// (calculator type) or 0.001 (least increment; a tenth of it in inch for lengths). Unset: such
+  /// numbers are refused, but 0.
+  std::optional<double> integer_increment;
 };
 
 struct InterpretationSummary {
@@ -38,10 +43,14 @@ struct InterpretationSummary {
   std::vector<int> work_systems;  ///< systems used by motions, in order of first use
 };
 
-/// Runs the program through the modal state of RS274NGC as LinuxCNC defines it and calls `sink` for
+/// Runs the program through the modal state of its dialect (Program::dialect) and calls `sink` for
 /// every motion, dwell, event and comment in the order in which that controller would act. Errors
 /// are collected: reading goes on after a bad block so that one run names every problem, but then
 /// the result has no value and what `sink` got is not a program.
+///
+/// A tool axis by vector (fanuc G43.5, siemens A3= B3= C3=) arrives as
+/// CanonicalMotion::axis_vector; the A B C bits of its unknown_start and unknown_end then say
+/// whether start_axis and end_axis are unknown.
 Result<InterpretationSummary> interpret(const Program& program, const InterpreterSettings& settings,
                                         CanonicalSink& sink);
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include "formats/nc/codes.h"
 #include "formats/nc/event_words.h"
 #include "kernels/core/canonical_motion.h"
@@ -18,11 +20,20 @@ struct ModalState {
   bool arc_absolute = false;
   bool inverse_time = false;
   bool tcp = false;
+  bool vector_words = false;              ///< fanuc G43.5: I J K are the tool axis
+  bool by_vector = false;                 ///< the tool axis was last given by a vector
+  bool machine_vectors = false;           ///< siemens ORIMKS
+  bool great_circle = false;              ///< siemens ORIVECT
+  bool linear_axes = false;               ///< siemens ORIAXES
+  bool tool_changed = false;              ///< an M6 came
+  Vec3 axis = Vec3::Zero();               ///< world, from tip to spindle; zero: not given
   double unit = 1.0;                      ///< mm per unit of a linear word
+  double feed_unit = 1.0;                 ///< mm per unit of a feed
   double linear_feed = 0.0;               ///< mm/s
   double angular_feed = 0.0;              ///< rad/s, for moves of rotary words only
   ModalWords words;                       ///< S and the selected T
   int spindle_tool = 0;                   ///< tool of the last M6; 0: none yet
+  std::string spindle_tool_name;          ///< siemens: its name, when it has one
   int length_tool = 0;                    ///< tool of the active G43; 0: none
   const EventRow* spindle_row = nullptr;  ///< event of the last M3, M4, M5 or M19 that has one
 };

@@ -14,7 +14,10 @@ struct ParsedProgram {
   Diagnostics diagnostics;
 };
 
-/// Splits NC text into blocks and pieces. Linear in the text, never throws on content.
+/// Splits NC text of a dialect into blocks and pieces. Linear in the text, never throws on content.
+ParsedProgram parse(std::string text, std::string file_name, InputDialect dialect);
+
+/// The same for LinuxCNC (RS274NGC).
 ParsedProgram parse(std::string text, std::string file_name);
 
 }  // namespace smoothpost::nc

@@ -9,23 +9,45 @@
 
 namespace smoothpost::nc {
 
+/// The language of a controller. Dialects differ in their text and in what words mean.
+enum class InputDialect : std::uint8_t { linuxcnc, fanuc, haas, siemens };
+
 /// What a piece of program text is. The pieces of a program tile its text: every byte is in exactly
 /// one.
 enum class PieceKind : std::uint8_t {
   space,         ///< blanks and tabs
-  word,          ///< letter and number: G1, X-1.5, N10
+  word,          ///< address and number: G1, X-1.5, N10, A3=0.1
+  assignment,    ///< #1=5, #<depth>=[2*3]; R1=5 of siemens
+  statement,     ///< siemens: TRAORI, MSG("text"), CTOL=0.02
   comment,       ///< ( ... ) or ; to the end of the line
   block_delete,  ///< /
   percent,       ///< %
   line_end,      ///< LF, CR LF or CR
-  construct,     ///< something of another dialect or a later issue: expression, O-word, # parameter
-                 ///< ...
+  construct,     ///< something of another dialect or a later issue: O-word, polar word ...
   trailer        ///< text after the second %, which controllers ignore
 };
+
+/// How the value of a word stands in the text.
+enum class WordForm : std::uint8_t {
+  number,       ///< Piece::value
+  expression,   ///< to be computed from the text when the block runs
+  absolute,     ///< siemens X=AC(..): the same, whatever G90 or G91 says
+  incremental,  ///< siemens X=IC(..)
+  name          ///< siemens T="DRILL"
+};
+
+/// Addresses of more than one letter, behind Z in a word's `letter`.
+inline constexpr char kAxisVectorX = 'Z' + 1;   ///< A3
+inline constexpr char kAxisVectorY = 'Z' + 2;   ///< B3
+inline constexpr char kAxisVectorZ = 'Z' + 3;   ///< C3
+inline constexpr char kCircleRadius = 'Z' + 4;  ///< CR
+inline constexpr char kCircleTurns = 'Z' + 5;   ///< TURN
+inline constexpr char kPlaneAngle = 'Z' + 6;    ///< RPL
 
 struct Piece {
   PieceKind kind = PieceKind::space;
   char letter = 0;          ///< upper case, kind word
+  std::uint8_t detail = 0;  ///< kind word: WordForm; kind statement: SiemensWord
   std::uint32_t begin = 0;  ///< byte offset into Program::text
   std::uint32_t length = 0;
   double value = 0.0;  ///< kind word
@@ -40,6 +62,7 @@ struct Block {
 /// NC text as a tree: one block a line, pieces with spans. Line = block index + 1; a piece's column
 /// is its offset from the block's first piece + 1.
 struct Program {
+  InputDialect dialect = InputDialect::linuxcnc;
   std::string file_name;
   std::string text;
   std::vector<Block> blocks;

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <string>
 
+#include "formats/nc/dialect_detection.h"
 #include "formats/nc/interpreter.h"
 #include "formats/nc/parser.h"
 #include "tests/fuzz/expect.h"
@@ -16,6 +17,7 @@ class Listener : public CanonicalSink {
   void motion(const CanonicalMotion& motion) override {
     for (const double value : motion.end) fuzz::expect(std::isfinite(value));
     for (const double value : motion.start) fuzz::expect(std::isfinite(value));
+    fuzz::expect(motion.start_axis.allFinite() && motion.end_axis.allFinite());
     fuzz::expect(std::isfinite(motion.duration) && motion.duration >= 0.0);
     if (motion.is_arc)
       fuzz::expect(motion.arc.centre.allFinite() && std::isfinite(motion.arc.sweep));
@@ -57,15 +59,20 @@ nc::InterpreterSettings shop_settings() {
 
 }  // namespace
 
-// Any bytes are parsed into pieces that print to the same bytes, and interpreted to a program of
-// finite motions or to diagnostics.
+// In every dialect any bytes are parsed into pieces that print to the same bytes, and interpreted
+// to a program of finite motions or to diagnostics.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string text(reinterpret_cast<const char*>(data), size);
-  const nc::ParsedProgram parsed = nc::parse(text, "fuzz.ngc");
-  fuzz::expect(nc::print(parsed.program) == text);
   static const nc::InterpreterSettings kSettings = shop_settings();
-  Listener listener;
-  const auto summary = nc::interpret(parsed.program, kSettings, listener);
-  fuzz::expect(summary.ok() != has_error(summary.diagnostics()));
+  for (const nc::InputDialect dialect : {nc::InputDialect::linuxcnc, nc::InputDialect::fanuc,
+                                         nc::InputDialect::haas, nc::InputDialect::siemens}) {
+    const nc::ParsedProgram parsed = nc::parse(text, "fuzz.ngc", dialect);
+    fuzz::expect(nc::print(parsed.program) == text);
+    Listener listener;
+    const auto summary = nc::interpret(parsed.program, kSettings, listener);
+    fuzz::expect(summary.ok() != has_error(summary.diagnostics()));
+  }
+  nc::fitting_dialects(text);
+  nc::is_heidenhain(text);
   return 0;
 }

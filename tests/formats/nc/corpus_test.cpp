@@ -67,9 +67,10 @@ struct Outcome {
 };
 
 /// A value or diagnostics with an error; the text comes back; numbers are finite.
-void require_outcome(std::string text, Outcome& outcome) {
+void require_outcome(std::string text, Outcome& outcome,
+                     nc::InputDialect dialect = nc::InputDialect::linuxcnc) {
   const std::size_t size = text.size();
-  const nc::ParsedProgram parsed = nc::parse(std::move(text), "t.nc");
+  const nc::ParsedProgram parsed = nc::parse(std::move(text), "t.nc", dialect);
   CountingSink sink;
   const auto result = nc::interpret(parsed.program, lenient(), sink);
   const bool sound =
@@ -182,7 +183,8 @@ TEST_CASE("corpus: 2,000 random prefixes of each file above 40 kB", "[formats][n
   report("2,000 random prefixes of files above 40 kB", outcome);
 }
 
-TEST_CASE("corpus: 10,000 byte mutations", "[formats][nc][corpus]") {
+TEST_CASE("corpus: 10,000 byte mutations, a quarter of them in each dialect",
+          "[formats][nc][corpus]") {
   if (corpus_missing()) return;
   std::mt19937 random(5);
   static const std::string kSigns = "GXYZABCIJKRPQFSTMNOEe0123456789.+-()[]#/%;=\"<> \t\n\r";
@@ -210,7 +212,7 @@ TEST_CASE("corpus: 10,000 byte mutations", "[formats][nc][corpus]") {
           break;
       }
     }
-    require_outcome(std::move(text), outcome);
+    require_outcome(std::move(text), outcome, static_cast<nc::InputDialect>(i % 4));
   }
   report("byte mutations", outcome);
   CHECK(outcome.value + outcome.refused == 10'000);
@@ -290,6 +292,32 @@ TEST_CASE("corpus: a printer's program needs the user's word for its E and M104"
   CHECK(read.sink.comments.front() == "unmapped: M104 S205 T1");
   WARN("model_1_Gcode.txt: " << read.sink.motions.size() << " motions, "
                              << read.sink.comments.size() << " comments");
+}
+
+TEST_CASE("corpus: every file in every dialect ends in a value or diagnostics with a place",
+          "[formats][nc][corpus]") {
+  if (corpus_missing()) return;
+  constexpr nc::InputDialect kDialects[] = {nc::InputDialect::linuxcnc, nc::InputDialect::fanuc,
+                                            nc::InputDialect::haas, nc::InputDialect::siemens};
+  std::map<int, int> read;
+  for (const File& file : nc_files()) {
+    if (file.text.size() > 1'000'000) continue;
+    for (const nc::InputDialect dialect : kDialects) {
+      INFO(file.path.string());
+      const nc::ParsedProgram parsed = nc::parse(file.text, "t.nc", dialect);
+      REQUIRE(nc::print(parsed.program) == file.text);
+      CountingSink sink;
+      const auto result = nc::interpret(parsed.program, lenient(), sink);
+      REQUIRE(result.ok() != has_error(result.diagnostics()));
+      REQUIRE(sink.finite);
+      read[static_cast<int>(dialect)] += result.ok() && !has_error(parsed.diagnostics) ? 1 : 0;
+      for (const Diagnostic& d : result.diagnostics()) {
+        if (d.severity == Severity::error && d.code != "NC100") REQUIRE(d.where.column > 0);
+      }
+    }
+  }
+  WARN("read as linuxcnc " << read[0] << ", fanuc " << read[1] << ", haas " << read[2]
+                           << ", siemens " << read[3] << " of " << nc_files().size());
 }
 
 TEST_CASE("corpus: what becomes of every file", "[formats][nc][corpus]") {

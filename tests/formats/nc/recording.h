@@ -109,9 +109,10 @@ struct Run {
   }
 };
 
-inline Run run(const std::string& text, const nc::InterpreterSettings& settings = {}) {
+inline Run run(const std::string& text, const nc::InterpreterSettings& settings = {},
+               nc::InputDialect dialect = nc::InputDialect::linuxcnc) {
   Run out;
-  const nc::ParsedProgram parsed = nc::parse(text, "t.ngc");
+  const nc::ParsedProgram parsed = nc::parse(text, "t.ngc", dialect);
   const auto result = nc::interpret(parsed.program, settings, out.sink);
   out.diagnostics = parsed.diagnostics;
   out.diagnostics.insert(out.diagnostics.end(), result.diagnostics().begin(),

@@ -427,6 +427,225 @@ TEST_CASE("interpreter against rs274: 200 random programs", "[formats][nc][oracl
   CHECK(arcs >= 1000);
 }
 
+/// Random programs of parameters and expressions; some end in a fault of value, on purpose.
+class ExpressionMaker {
+ public:
+  explicit ExpressionMaker(unsigned seed) : random_(seed) {}
+
+  std::string make() {
+    std::string text = "G21 G90 G17 G94 F500\nG0 X0 Y0 Z0 A0 B0 C0\n";
+    for (int i = 1; i <= 6; ++i) {
+      text += "#" + std::to_string(i) + "=" + number() + " #<n" + std::to_string(i) +
+              "> = " + number() + " #<_g" + std::to_string(i) + ">=[" + number() + "]\n";
+    }
+    for (int i = 0; i < 25;) {
+      const std::string next = line();
+      if (next.size() > 240) continue;  // "Command too long"
+      text += next + "\n";
+      ++i;
+    }
+    return text + "M2\n";
+  }
+
+ private:
+  int dice(int n) { return std::uniform_int_distribution<int>(0, n - 1)(random_); }
+  std::string pick(std::initializer_list<const char*> list) {
+    return *(list.begin() + dice(static_cast<int>(list.size())));
+  }
+  std::string number() {
+    char buffer[40];
+    std::snprintf(buffer, sizeof buffer, dice(2) ? "%.0f" : "%.3f", dice(4001) / 100.0 - 20.0);
+    return buffer;
+  }
+  std::string parameter() {
+    switch (dice(6)) {
+      case 0:
+        return "#<N " + std::to_string(1 + dice(6)) + ">";
+      case 1:
+        return "#<_G" + std::to_string(1 + dice(6)) + ">";
+      case 2:
+        return "#[" + std::to_string(dice(3)) + "+" + std::to_string(1 + dice(3)) + "]";
+      case 3:
+        return "#" + std::to_string(5420 + dice(6));
+      case 4:
+        return pick(
+            {"#<_x>", "#<_metric>", "#<_incremental>", "#5220", "#5400", "#<_motion_mode>"});
+      default:
+        return "#" + std::to_string(1 + dice(6));
+    }
+  }
+  std::string function(int depth) {
+    const std::string name = pick({"ABS", "sin", "COS", "Tan", "FIX", "fup", "round", "sqrt", "LN",
+                                   "exp", "a s i n", "acos", "ATAN", "EXISTS"});
+    if (name == "EXISTS") return name + "[" + parameter() + "]";
+    if (name == "exp") return "exp[[" + value(depth) + "] MOD 5]";
+    if (name == "a s i n" || name == "acos") return name + "[[" + value(depth) + "]/1000]";
+    if ((name == "sqrt" || name == "LN") && dice(20) != 0) {
+      return name + "[ABS[" + value(depth) + "]+0.5]";
+    }
+    std::string out = name + "[" + value(depth) + "]";
+    if (name == "ATAN") out += "/[" + value(depth) + "]";
+    return out;
+  }
+  std::string value(int depth) {
+    if (depth <= 0) return dice(2) ? number() : parameter();
+    switch (dice(8)) {
+      case 0:
+        return number();
+      case 1:
+        return parameter();
+      case 2:
+        return function(depth - 1);
+      case 3:
+        return "-[" + value(depth - 1) + "]";
+      case 4:
+        return "[" + value(depth - 1) + " * 0.01]**2";
+      default:
+        return "[" + value(depth - 1) + operation() + value(depth - 1) + operation() +
+               value(depth - 1) + "]";
+    }
+  }
+  std::string operation() {
+    if (dice(60) == 0) return "/";  // sometimes by zero
+    return pick({" + ", "-", " * ", "*", " MOD ", " EQ ", " ne ", " GT ", "GE", " LT ", " le ",
+                 " AND ", "or", " XOR "});
+  }
+  /// A word whose value stays in a range in which four decimals tell.
+  std::string word(char letter) {
+    return std::string(" ") + letter + "[[" + value(3) + "] MOD 360 - 100]";
+  }
+  std::string line() {
+    switch (dice(8)) {
+      case 0:
+        return "#" + std::to_string(1 + dice(6)) + "=[" + value(3) + " MOD 50]";
+      case 1:
+        return "#<n" + std::to_string(1 + dice(6)) + "> = [" + value(2) + " MOD 20]";
+      case 2:
+        return "#3=[#3+1] #4=#3 G1" + word('X') + " #4=[#4*0.5]";
+      case 3:
+        return pick({"G91", "G90", "G#7", "G[90+1]", "M[4+5]", "G92 X#1", "G92.1"});
+      default:
+        return (dice(2) ? "G1" : "G0") + word('X') + (dice(2) ? word('Y') : "") +
+               (dice(3) ? "" : word('A')) + (dice(3) ? "" : " Z#" + std::to_string(1 + dice(6)));
+    }
+  }
+
+  std::mt19937 random_;
+};
+
+TEST_CASE("expression: against rs274 in 60 random programs", "[formats][nc][oracle]") {
+  if (!oracle_present()) {
+    WARN("rs274 is not installed: skipped");
+    return;
+  }
+  std::size_t motions = 0, accepted = 0;
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    const std::string text = ExpressionMaker(seed).make();
+    const OracleRun oracle = run_oracle(text);
+    const Run ours = run(text, oracle_settings());
+    INFO("seed " << seed << "\n" << text);
+    INFO("rs274: " << oracle.message);
+    INFO("ours: " << ours.all_text());
+    REQUIRE(ours.ok == oracle.accepted);
+    if (!oracle.accepted) continue;
+    ++accepted;
+    const Comparison result = compare(ours.sink.motions, oracle);
+    INFO(result.problem);
+    REQUIRE(result.problem.empty());
+    motions += result.motions;
+  }
+  WARN("expressions compared with rs274: " << accepted << " of 60 programs, " << motions
+                                           << " motions");
+  CHECK(accepted >= 20);
+}
+
+TEST_CASE("expression: single lines are refused exactly when rs274 refuses them",
+          "[formats][nc][oracle]") {
+  if (!oracle_present()) {
+    WARN("rs274 is not installed: skipped");
+    return;
+  }
+  for (const char* line : {"X[1/0]",
+                           "X[7 MOD 0]",
+                           "X[SQRT[-1]]",
+                           "X[LN[0]]",
+                           "X[ACOS[1.1]]",
+                           "X[ASIN[-1.1]]",
+                           "X[[-8]**[1/3]]",
+                           "X[[-8]**3]",
+                           "X#0",
+                           "X#5602",
+                           "X#5601",
+                           "X#1.5",
+                           "X#1.00001",
+                           "X#<a>",
+                           "X[EXISTS[#<a>]]",
+                           "X[EXISTS[#5]]",
+                           "X[EXISTS[5]]",
+                           "X[EXISTS[#6000]]",
+                           "X[2+]",
+                           "X[]",
+                           "X[1 2]",
+                           "X[1",
+                           "X1]",
+                           "X[ATAN[1]]",
+                           "X[ATAN[1]/2]",
+                           "X[ATAN[1]/[2]]",
+                           "XFOO[1]",
+                           "X[0x]",
+                           "X[1.0.1]",
+                           "#1 5",
+                           "#1=",
+                           "#5420=1",
+                           "#5428=1",
+                           "#5400=1",
+                           "#<_x>=1",
+                           "#<a>=1",
+                           "#<>=1",
+                           "#<a=1",
+                           "##1=2",
+                           "#[1]=2",
+                           "G[0.5]",
+                           "G[1.0004] F1 X1",
+                           "G[90.00001]",
+                           "M[5.00001]",
+                           "M[5.01]",
+                           "T[1.00001]",
+                           "T[1.1]",
+                           "N[5]",
+                           "F[1/3]",
+                           "G4 P[-1]",
+                           "G4 P[0.1]",
+                           "X[3 - -2]",
+                           "X[1 + +2]",
+                           "X-[2]",
+                           "X+[2]",
+                           "X-#1",
+                           "Xsin[30]",
+                           "X s i n [ 3 0 ]",
+                           "X[2**3**2]",
+                           "X[1 AND 0 OR 1 XOR 1]",
+                           "X[3 GT 2 GT 1]",
+                           "X[FIX[-2.5]]",
+                           "X[(a)2]",
+                           "X[#5 EQ 0]",
+                           "X1 #1=2 X2",
+                           "#1=2 #1=3",
+                           "X##1",
+                           "#1=1 X##1",
+                           "S[-1]",
+                           "X[EXP[1000]]",
+                           "X[1e3]",
+                           "X[.5.]",
+                           "X[1,2]"}) {
+    const std::string text = std::string("G0 X0 Y0 Z0 A0 B0 C0 F100\n") + line + "\nM2\n";
+    const bool ours = run(text, oracle_settings()).ok;
+    const OracleRun oracle = run_oracle(text);
+    INFO(line << ": rs274 says " << oracle.message);
+    CHECK(ours == oracle.accepted);
+  }
+}
+
 TEST_CASE("interpreter against rs274: corpus programs that both accept", "[formats][nc][oracle]") {
   if (!oracle_present() || !shared_path("corpus")) {
     WARN("rs274 or the corpus is not here: skipped");

@@ -1,0 +1,313 @@
+#include "formats/nc/siemens_builder.h"
+
+#include <cstring>
+
+#include "formats/nc/number_text.h"
+
+namespace smoothpost::nc {
+namespace {
+
+bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
+bool begins_name(char c) { return is_letter(c) || c == '_' || c == '$'; }
+bool begins_number(char c) { return detail::is_digit(c) || c == '.' || c == '+' || c == '-'; }
+char upper(char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 32) : c; }
+
+/// Whether an expression goes on behind a number: an operator, or DIV and MOD.
+bool goes_on(std::string_view rest) {
+  if (rest.empty()) return false;
+  if (std::strchr("+-*/<>=(", rest.front()) != nullptr) return true;
+  const std::string word = upper_text(rest.substr(0, 3));
+  return word == "DIV" || word == "MOD";
+}
+
+}  // namespace
+
+void SiemensBuilder::content(const char* p) {
+  while (p != line_end_) {
+    p = detail::is_blank(*p) ? blanks(p) : item(p);
+  }
+}
+
+const char* SiemensBuilder::item(const char* begin) {
+  const char c = *begin;
+  if (is_letter(c)) return letter(begin);
+  if (begins_name(c)) return name(begin, behind_name(begin));
+  if (c == ';') {
+    push(PieceKind::comment, begin, line_end_);
+    return line_end_;
+  }
+  if (c == '%' && only_blanks_) return statement(SiemensWord::no_effect, begin, line_end_);
+  if (c == '/' && only_blanks_) {
+    const char* end = begin + 1;
+    if (end != line_end_ && detail::is_digit(*end)) ++end;
+    deleted_ = true;
+    push(PieceKind::block_delete, begin, end);
+    return end;
+  }
+  if (c == ':' && !words_in_line_) {
+    const ScannedNumber scanned = scan_number(begin + 1, line_end_);
+    if (scanned.ok) {
+      push_word('N', begin, scanned);
+      return scanned.next;
+    }
+  }
+  if (c == '(' || c == ')' || c == '"' || c == '=' || c == '[' || c == ']' || c == '#') {
+    return push_refused("NC143", std::string("\"") + c + "\" begins no word of a Sinumerik program",
+                        {begin, static_cast<std::size_t>(end_of_statement(begin) - begin)});
+  }
+  return push_construct(measure_construct(rest_of_line(begin)), begin);
+}
+
+/// A word such as X10, an address or name behind which = or ( stands, or a name alone.
+const char* SiemensBuilder::letter(const char* begin) {
+  const char* second = skip_blanks(begin + 1);
+  if (second != line_end_ && *second == '=' && (second + 1 == line_end_ || second[1] != '=')) {
+    return assigned(begin, begin + 1, second);
+  }
+  if (begin + 1 == line_end_ || !begins_number(begin[1])) return name(begin, behind_name(begin));
+  const ScannedNumber scanned = scan_number(begin + 1, line_end_);
+  if (!scanned.ok) return push_construct(measure_construct(rest_of_line(begin)), begin);
+  const char* behind = skip_blanks(scanned.next);
+  if (behind != line_end_ && *behind == '=' && detail::is_digit(begin[1])) {
+    return assigned(begin, behind_name(begin), behind);
+  }
+  const char* next = scanned.next;
+  if (next != line_end_ && (*next == '_' || *next == '(' || *next == '[')) {
+    return name(begin, behind_name(begin));
+  }
+  return word_end(begin, upper(*begin), scanned);
+}
+
+const char* SiemensBuilder::word_end(const char* begin, char letter, const ScannedNumber& scanned) {
+  const std::string_view text(begin, static_cast<std::size_t>(scanned.next - begin));
+  const std::string_view rest = rest_of_line(scanned.next);
+  const bool exponent = rest.size() > 2 && upper_text(rest.substr(0, 2)) == "EX";
+  if (text.find_first_of(" \t") != std::string_view::npos ||
+      (!rest.empty() && (rest[0] == '.' || rest[0] == ','))) {
+    return push_construct({Construct::bad_number, static_cast<std::uint32_t>(text.size())}, begin);
+  }
+  if (exponent) return address(begin, letter, begin + 1);
+  if (letter == 'N') {
+    if (words_in_line_) {
+      return push_construct(
+          {Construct::misplaced_line_number, static_cast<std::uint32_t>(text.size())}, begin);
+    }
+  } else if (letter == 'R' || letter == 'O' || letter == 'L' || letter == 'P' || letter == 'E' ||
+             letter == 'Q') {
+    const std::string why = letter == 'L' || letter == 'P'
+                                ? ": calls of subprograms are not read in this version; let the "
+                                  "CAM post write the moves out"
+                                : ": no address of this control; R parameters are written R1=5, a "
+                                  "circle's radius CR=5";
+    return push_refused("NC141", std::string(text) + why, text);
+  }
+  push_word(letter, begin, scanned);
+  if (letter == 'M' && !deleted_ &&
+      (scanned.value == 2.0 || scanned.value == 17.0 || scanned.value == 30.0)) {
+    ended_ = true;
+  }
+  return scanned.next;
+}
+
+/// The comment behind `p` or the line's end, without the blanks before it.
+const char* SiemensBuilder::end_of_statement(const char* begin) const {
+  const char* end = begin + 1;
+  for (bool quoted = false; end != line_end_ && (quoted || *end != ';'); ++end) {
+    if (*end == '"') quoted = !quoted;
+  }
+  while (end > begin + 1 && detail::is_blank(end[-1])) --end;
+  return end;
+}
+
+const char* SiemensBuilder::behind_name(const char* p) const {
+  while (p != line_end_ && (begins_name(*p) || detail::is_digit(*p))) ++p;
+  return p;
+}
+
+/// Behind the parenthesis or bracket that closes the one at `open`, quoted text passed over; the
+/// line's end when there is none.
+const char* SiemensBuilder::behind_group(const char* open, char close) const {
+  int depth = 0;
+  bool quoted = false;
+  for (const char* p = open; p != line_end_; ++p) {
+    if (*p == '"') quoted = !quoted;
+    if (quoted) continue;
+    if (*p == *open) ++depth;
+    if (*p == close && --depth == 0) return p + 1;
+  }
+  return line_end_;
+}
+
+const char* SiemensBuilder::statement(SiemensWord word, const char* begin, const char* end) {
+  push(PieceKind::statement, begin, end);
+  program_.pieces.back().detail = static_cast<std::uint8_t>(word);
+  words_in_line_ = words_seen_ = true;
+  if (word == SiemensWord::program_end && !deleted_) ended_ = true;
+  return end;
+}
+
+const char* SiemensBuilder::refuse_name(const char* begin, const char* name_end, const char* end) {
+  const std::string_view name(begin, static_cast<std::size_t>(name_end - begin));
+  return push_refused("NC140", siemens_refusal(name.substr(0, 60)),
+                      {begin, static_cast<std::size_t>(end - begin)});
+}
+
+const char* SiemensBuilder::refuse_value(const char* begin, const char* value,
+                                         const Evaluated& found) {
+  error("NC142", "the expression cannot be read: " + found.problem, value + found.at);
+  const char* end = end_of_statement(begin);
+  push(PieceKind::construct, begin, end);
+  words_in_line_ = words_seen_ = true;
+  return end;
+}
+
+const char* SiemensBuilder::name(const char* begin, const char* name_end) {
+  const std::string_view text(begin, static_cast<std::size_t>(name_end - begin));
+  const char* behind = skip_blanks(name_end);
+  const char next = behind == line_end_ ? '\0' : *behind;
+  if (next == '=' && (behind + 1 == line_end_ || behind[1] != '=')) {
+    return assigned(begin, name_end, behind);
+  }
+  if (next == '(') return call(begin, name_end);
+  if (next == '[') return array(begin, behind);
+  if (next == ':' && !words_in_line_) return statement(SiemensWord::no_effect, begin, behind + 1);
+  if (upper_text(text) == "DEF") return declaration(begin, name_end);
+  const SiemensWord word = siemens_keyword(text);
+  if (word != SiemensWord::none) return statement(word, begin, name_end);
+  if (text.size() == 1) return push_construct({Construct::letter_alone, 1}, begin);
+  // What follows the first word of a command or jump belongs to it.
+  return refuse_name(begin, name_end, end_of_statement(begin));
+}
+
+const char* SiemensBuilder::array(const char* begin, const char* bracket) {
+  const char* end = behind_group(bracket, ']');
+  const char* behind = skip_blanks(end);
+  if (behind != line_end_ && *behind == '=') {
+    const Evaluated value = evaluate_siemens(rest_of_line(behind + 1), nullptr);
+    end = value.ok() ? behind + 1 + value.length : end_of_statement(begin);
+  }
+  return refuse_name(begin, behind_name(begin), end);
+}
+
+const char* SiemensBuilder::call(const char* begin, const char* name_end) {
+  const char* open = skip_blanks(name_end);
+  const char* end = behind_group(open, ')');
+  const std::string_view text(begin, static_cast<std::size_t>(end - begin));
+  if (end[-1] != ')') {
+    return push_refused("NC143", "a parenthesis or quoted text is not closed on its line", text);
+  }
+  const std::string_view name(begin, static_cast<std::size_t>(name_end - begin));
+  const std::string_view arguments(open + 1, static_cast<std::size_t>(end - open) - 2);
+  const SiemensWord word = siemens_call(name, arguments);
+  if (word == SiemensWord::none) return refuse_name(begin, name_end, end);
+  return statement(word, begin, end);
+}
+
+const char* SiemensBuilder::assigned(const char* begin, const char* name_end, const char* equals) {
+  const std::string_view text(begin, static_cast<std::size_t>(name_end - begin));
+  const char* value = skip_blanks(equals + 1);
+  if (const char known = siemens_address(text)) return address(begin, known, value);
+  const Evaluated found = evaluate_siemens(rest_of_line(value), nullptr);
+  const std::string name = upper_text(text);
+  const bool variable = is_r_parameter(name) || declared_.contains(name);
+  const bool tolerance = is_siemens_tolerance(name);
+  if (!variable && !tolerance) {
+    return refuse_name(begin, name_end,
+                       found.ok() ? value + found.length : end_of_statement(begin));
+  }
+  if (!found.ok()) return refuse_value(begin, value, found);
+  const char* end = value + found.length;
+  if (tolerance) return statement(SiemensWord::no_effect, begin, end);
+  push(PieceKind::assignment, begin, end);
+  words_in_line_ = words_seen_ = true;
+  return end;
+}
+
+/// A word with =, or with an exponent; `value` is where its value begins.
+const char* SiemensBuilder::address(const char* begin, char address, const char* value) {
+  const std::string_view rest = rest_of_line(value);
+  if (address == 'T' && !rest.empty() && rest.front() == '"') return tool_name(begin, value);
+  const ScannedNumber number = scan_number(value, line_end_);
+  if (number.ok && (number.next == line_end_ || detail::is_blank(*number.next)) &&
+      !goes_on(rest_of_line(skip_blanks(number.next))) &&
+      std::memchr(value, ' ', static_cast<std::size_t>(number.next - value)) == nullptr) {
+    push_word(address, begin, number);
+    return number.next;
+  }
+  WordForm form = WordForm::expression;
+  std::size_t offset = 0;
+  const char* name_end = behind_name(value);
+  const char* open = skip_blanks(name_end);
+  if (open != line_end_ && *open == '(') {
+    const std::string mode = upper_text({value, static_cast<std::size_t>(name_end - value)});
+    if (mode == "DC" || mode == "ACP" || mode == "ACN" || mode == "CDC" || mode == "CIC" ||
+        mode == "CAC" || mode == "CACP" || mode == "CACN") {
+      const char* end = behind_group(open, ')');
+      return push_refused("NC141",
+                          mode +
+                              "(): a rotary position by the shorter way, a sense or an index is "
+                              "not read; let the CAM post write plain positions",
+                          {begin, static_cast<std::size_t>(end - begin)});
+    }
+    if (mode == "AC" || mode == "IC") {
+      form = mode == "AC" ? WordForm::absolute : WordForm::incremental;
+      offset = static_cast<std::size_t>(open - value);
+    }
+  }
+  const Evaluated found = evaluate_siemens(rest.substr(offset), nullptr);
+  if (!found.ok()) return refuse_value(begin, value + offset, found);
+  ScannedNumber span;
+  span.next = value + offset + found.length;
+  push_word(address, begin, span, form);
+  return span.next;
+}
+
+const char* SiemensBuilder::tool_name(const char* begin, const char* quote) {
+  const char* close = quote + 1;
+  while (close != line_end_ && *close != '"') ++close;
+  if (close == line_end_) {
+    return push_refused("NC143", "a parenthesis or quoted text is not closed on its line",
+                        rest_of_line(begin));
+  }
+  ScannedNumber span;
+  span.next = close + 1;
+  push_word('T', begin, span, WordForm::name);
+  return span.next;
+}
+
+/// DEF REAL a, b=2.5
+const char* SiemensBuilder::declaration(const char* begin, const char* name_end) {
+  const char* end = end_of_statement(begin);
+  const char* type = skip_blanks(name_end);
+  const char* p = behind_name(type);
+  const std::string kind = upper_text({type, static_cast<std::size_t>(p - type)});
+  bool good = kind == "REAL" || kind == "INT" || kind == "BOOL";
+  while (good) {
+    p = skip_blanks(p);
+    good = declare(p);
+    p = skip_blanks(p);
+    if (p >= end || *p != ',') break;
+    ++p;
+  }
+  if (!good || p < end) {
+    return push_refused("NC140",
+                        "DEF: only scalar REAL, INT and BOOL variables with a plain value are "
+                        "read; let the CAM post write plain numbers",
+                        {begin, static_cast<std::size_t>(end - begin)});
+  }
+  return statement(SiemensWord::declaration, begin, end);
+}
+
+bool SiemensBuilder::declare(const char*& p) {
+  if (p == line_end_ || !begins_name(*p)) return false;
+  const char* end = behind_name(p);
+  declared_.insert(upper_text({p, static_cast<std::size_t>(end - p)}));
+  p = skip_blanks(end);
+  if (p == line_end_ || *p != '=') return p == line_end_ || *p != '[';
+  const Evaluated value = evaluate_siemens(rest_of_line(p + 1), nullptr);
+  if (!value.ok()) return false;
+  p += 1 + value.length;
+  return true;
+}
+
+}  // namespace smoothpost::nc

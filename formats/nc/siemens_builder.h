@@ -1,0 +1,44 @@
+#pragma once
+
+#include <string>
+#include <unordered_set>
+
+#include "formats/nc/siemens_expression.h"
+#include "formats/nc/siemens_words.h"
+#include "formats/nc/tree_builder.h"
+
+namespace smoothpost::nc {
+
+/// Splits the text of a Sinumerik 840D program: words (X10, X=R1+2, A3=0.1, X=AC(5), T="DRILL"),
+/// assignments to R parameters and declared variables, statements (TRAORI, MSG("text"), CTOL=0.02),
+/// ; comments, / and /1 skip levels, %_N_NAME_MPF lines.
+class SiemensBuilder final : public TreeBuilder {
+ public:
+  using TreeBuilder::TreeBuilder;
+
+ protected:
+  void content(const char* begin) override;
+
+ private:
+  const char* item(const char* begin);
+  const char* letter(const char* begin);
+  const char* name(const char* begin, const char* name_end);
+  const char* word_end(const char* begin, char letter, const ScannedNumber& scanned);
+  const char* assigned(const char* begin, const char* name_end, const char* equals);
+  const char* address(const char* begin, char address, const char* value);
+  const char* tool_name(const char* begin, const char* quote);
+  const char* call(const char* begin, const char* name_end);
+  const char* array(const char* begin, const char* bracket);
+  const char* declaration(const char* begin, const char* name_end);
+  bool declare(const char*& p);
+  const char* statement(SiemensWord word, const char* begin, const char* end);
+  const char* refuse_name(const char* begin, const char* name_end, const char* end);
+  const char* refuse_value(const char* begin, const char* value, const Evaluated& found);
+  const char* end_of_statement(const char* begin) const;
+  const char* behind_name(const char* p) const;
+  const char* behind_group(const char* open, char close) const;
+
+  std::unordered_set<std::string> declared_;
+};
+
+}  // namespace smoothpost::nc

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "formats/nc/program.h"
+
+namespace smoothpost::nc {
+
+/// What a statement of a Sinumerik 840D program does here; the `detail` of a statement piece.
+enum class SiemensWord : std::uint8_t {
+  none,         ///< not read
+  no_effect,    ///< path and dynamics words, tolerances, labels, program names
+  traori,       ///< tool-centre-point mode on
+  trafoof,      ///< any transformation off
+  oriwks,       ///< tool axis vectors in the workpiece
+  orimks,       ///< tool axis vectors in the machine
+  orivect,      ///< the tool axis turns on a great circle
+  oriaxes,      ///< the rotary axes go linearly
+  trans,        ///< frame: shift
+  atrans,       ///< frame: further shift
+  rot,          ///< frame: rotation
+  arot,         ///< frame: further rotation
+  supa,         ///< this block in machine coordinates
+  message,      ///< MSG("text")
+  cycle832,     ///< tolerance cycle
+  no_swivel,    ///< CYCLE800(): end of the swivelled plane
+  declaration,  ///< DEF REAL name, ...
+  program_end   ///< RET
+};
+
+/// The meaning of a word that stands alone: TRAORI, SOFT, G642 is none of them. Any case.
+SiemensWord siemens_keyword(std::string_view name);
+
+/// The meaning of NAME(...) with the given text between its parentheses.
+SiemensWord siemens_call(std::string_view name, std::string_view arguments);
+
+/// The address of NAME=...: a letter, one of the addresses of program.h, or 0.
+char siemens_address(std::string_view name);
+
+/// NAME=... that sets a tolerance of the path and nothing here.
+bool is_siemens_tolerance(std::string_view name);
+
+/// R1, R25: an arithmetic parameter.
+bool is_r_parameter(std::string_view name);
+
+/// Why a word, call or address is not read, and what to do.
+std::string siemens_refusal(std::string_view name);
+
+/// "A3", "CR", "X": the text of an address.
+std::string address_text(char address);
+
+/// `text` in upper case.
+std::string upper_text(std::string_view text);
+
+}  // namespace smoothpost::nc
