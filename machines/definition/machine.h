@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,11 +28,11 @@ struct AxisDefinition {
 };
 
 struct ToolDefinition {
-  Vec3 tip = Vec3::Zero();    ///< in the last link, mm; where a tool of length 0 has its tip
-  Vec3 axis = Vec3::UnitZ();  ///< unit, from tip to holder
+  Vec3 tip = Vec3::Zero();         ///< in the last link, mm; where a tool of length 0 has its tip
+  Vec3 axis = Vec3::UnitZ();       ///< unit, from tip to holder
   Pose flange = Pose::Identity();  ///< X_MF with every joint 0, for controllers that state the tool
                                    ///< in the flange's frame
-  double gap = 0.0;           ///< nominal distance tip to part while the beam is on, mm
+  double gap = 0.0;                ///< nominal distance tip to part while the beam is on, mm
   double land_radius = 0.0;
   double min_gap = 0.0;
 };
@@ -97,6 +98,7 @@ struct RecipeSettings {
   std::string solver = "hybrid";
   std::string schedule = "programmed";
   int knot_every = 4;
+  std::optional<double> spin;  ///< rad, arms: rotation about the tool axis; nothing: chosen
 };
 
 struct DialectSettings {

@@ -255,6 +255,7 @@ RecipeSettings read_recipe(TableReader reader) {
   choose("solver", {"hybrid", "ipopt", "banded"}, recipe.solver);
   choose("schedule", {"jerk", "constant", "programmed"}, recipe.schedule);
   recipe.knot_every = reader.integer("knot_every", 1, 1000000).value_or(recipe.knot_every);
+  if (const auto spin = reader.number("spin_deg")) recipe.spin = *spin * kRadiansPerDegree;
   reader.finish();
   return recipe;
 }

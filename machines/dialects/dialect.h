@@ -43,7 +43,8 @@ struct MachineMove {
   std::uint32_t segment = 0;  ///< role path: segment of the ToolPath (1 = from point 0 to point 1)
   double from_share = 0.0;    ///< role path: the part of that segment, shares in [0, 1]
   double to_share = 1.0;
-  double duration = 0.0;  ///< s; 0 for a rapid
+  double duration = 0.0;     ///< s; 0 for a rapid
+  double tool_length = 0.0;  ///< mm, of the tool in the holder
 };
 
 /// What happens before move `before` (or at the end when before == moves.size()).
@@ -65,8 +66,8 @@ struct MachineAction {
 /// A program in joints: what is to be printed.
 struct MachineProgram {
   std::vector<std::string> title;  ///< comment lines at the top
-  Pose part = Pose::Identity();    ///< X_MW with every joint 0: what BASE or the work offset must be
-  double tool_length = 0.0;        ///< mm, of the tool at the start, for dialects that state it
+  Pose part = Pose::Identity();  ///< X_MW with every joint 0: what BASE or the work offset must be
+  double tool_length = 0.0;      ///< mm, of the tool at the start, for dialects that state it
   std::vector<MachineMove> moves;
   std::vector<MachineAction> actions;  ///< sorted by before
   bool certified = true;               ///< false: print NOT CERTIFIED and an operator stop first
@@ -83,8 +84,8 @@ struct ReadBackMove {
   JointVector to;
   JointMask known = 0;  ///< joints whose position the program has set by the end of this move
   MoveInterpolation interpolation = MoveInterpolation::joints;
-  Pose tool = Pose::Identity();  ///< interpolation tool: X_WT at the end; `to` holds only the joints
-                                 ///< that the block names (external axes)
+  Pose tool = Pose::Identity();  ///< interpolation tool: X_WT at the end; `to` holds only the
+                                 ///< joints that the block names (external axes)
   bool rapid = false;
   bool beam = false;      ///< beam on while it moves
   double duration = 0.0;  ///< s, from F; 0 for a rapid
@@ -114,7 +115,7 @@ struct ReadBack {
 enum class ToolTurn : std::uint8_t {
   none,          ///< the dialect has no such moves
   great_circle,  ///< the tool axis on the great circle; rotation about it is not commanded
-  slerp          ///< one rotation about a fixed axis
+  slerp          ///< close to one rotation about a fixed axis: within the square of its angle, by 8
 };
 
 /// One row of the table of output dialects (postproc/pipeline/registry).
@@ -123,11 +124,13 @@ struct Dialect {
   const char* description;
   const char* interpolation;  ///< what the controller does between blocks, for the certificate
   ToolTurn tool_turn;
+  bool joints_linear;  ///< joint moves are straight in the joints; false: only their ends are known
   /// Fails with PR1xx when an event has no words on this machine, all such events collected.
   Result<EmittedProgram> (*emit)(const MachineDefinition& machine, const MachineProgram& program);
   /// Reads program text as that controller would; errors NC1xx. `file_name` is for messages.
   Result<ReadBack> (*read_back)(const MachineDefinition& machine, std::string text,
                                 const std::string& file_name);
+  const char* guard;  ///< what the program's guard makes sure of, for the certificate
 };
 
 }  // namespace smoothpost

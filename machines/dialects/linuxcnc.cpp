@@ -336,6 +336,32 @@ bool take_guard(std::string& text) {
   return true;
 }
 
+// A machine program states its numbers: what a parameter or an expression comes to depends on what
+// the controller has stored.
+Diagnostics computed_words(const nc::Program& program) {
+  Diagnostics diagnostics;
+  for (std::size_t i = 0; i < program.blocks.size() && diagnostics.size() < 10; ++i) {
+    const nc::Block& block = program.blocks[i];
+    for (std::uint32_t k = 0; k < block.piece_count; ++k) {
+      const nc::Piece& piece = program.pieces[block.first_piece + k];
+      const bool computed = piece.kind == nc::PieceKind::assignment ||
+                            (piece.kind == nc::PieceKind::word &&
+                             piece.detail != static_cast<std::uint8_t>(nc::WordForm::number));
+      if (!computed) continue;
+      Diagnostic d;
+      d.code = "NC302";
+      d.where = {program.file_name, static_cast<int>(i + 1),
+                 static_cast<int>(piece.begin - program.pieces[block.first_piece].begin + 1)};
+      d.text =
+          "a parameter or an expression in a program of joint words is not certified: its value "
+          "depends on the controller. Write the number";
+      diagnostics.push_back(std::move(d));
+      break;
+    }
+  }
+  return diagnostics;
+}
+
 // Exact path holds when the first path mode word stands before the first motion, is G61, and no
 // other path mode follows.
 bool is_exact_path(const nc::Program& program) {
@@ -361,6 +387,8 @@ Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
   auto parsed = nc::parse(std::move(text), file_name);
   if (has_error(parsed.diagnostics))
     return Result<ReadBack>::failure(std::move(parsed.diagnostics));
+  if (auto computed = computed_words(parsed.program); !computed.empty())
+    return Result<ReadBack>::failure(std::move(computed));
   nc::InterpreterSettings settings;
   settings.inch_default = machine.dialect.units == "inch";
   settings.has_tcp = false;
@@ -385,9 +413,15 @@ Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
   return Result<ReadBack>(std::move(sink.result), std::move(diagnostics));
 }
 
-const Dialect kDialect = {"linuxcnc", "LinuxCNC 2.9, joint words (trivkins), G93, exact path",
+const Dialect kDialect = {"linuxcnc",
+                          "LinuxCNC 2.9, joint words (trivkins), G93, exact path",
                           "all joints linear between blocks, exact path (G61): the controller "
                           "stops blending at block ends",
-                          ToolTurn::none, &emit, &read_back};
+                          ToolTurn::none,
+                          true,
+                          &emit,
+                          &read_back,
+                          "every work, G92 and tool offset of the controller is zero: the program "
+                          "aborts before its first motion otherwise"};
 
 }  // namespace smoothpost::linuxcnc

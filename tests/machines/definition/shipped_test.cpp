@@ -38,6 +38,14 @@ bool within(double value, const AxisDefinition& a) {
   return value >= a.joint.lower && value <= a.joint.upper;
 }
 
+/// Home and retract position are inside the axes' ranges.
+bool within_ranges(const MachineDefinition& machine) {
+  for (const AxisDefinition& a : machine.axes)
+    if (!within(a.joint.home, a)) return false;
+  return machine.links.retract_axis.empty() ||
+         within(machine.links.retract, axis(machine, machine.links.retract_axis));
+}
+
 }  // namespace
 
 TEST_CASE("machine files: every machine.toml of the tree loads without a message",
@@ -51,9 +59,10 @@ TEST_CASE("machine files: every machine.toml of the tree loads without a message
     CHECK(parse_machine_file(test::read_bytes(file), "m").diagnostics().empty());
     CHECK(machine.name == entry.path().filename().string());
     CHECK(std::filesystem::exists(entry.path() / "README.md"));
+    CHECK(within_ranges(machine));
     ++count;
   }
-  CHECK(count >= 3);
+  CHECK(count >= 9);
 }
 
 TEST_CASE("machine files: the example of docs/machine_file.md loads and shows every key",
@@ -147,6 +156,55 @@ TEST_CASE("laser_5p1: tip = (q1, q2, q3) - (L0 - q6) O with L0 = 0",
   }
 }
 
+TEST_CASE("laser_5p1_offset: laser_5p1 with a head that has lengths",
+          "[machines][definition][paper]") {
+  const MachineDefinition machine = shipped("laser_5p1_offset");
+  const MachineDefinition plain = shipped("laser_5p1");
+  const ScrewChain chain = chain_of(machine);
+  std::mt19937 random(8);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  for (int i = 0; i < 1000; ++i) {
+    JointVector q(6);
+    for (int j = 0; j < 6; ++j) q[j] = uniform(random) * (j == 3 || j == 4 ? 1.5 : 500.0);
+    const Mat3 c = rotation_about(Vec3::UnitZ(), q[3]);
+    const Mat3 b = rotation_about(Vec3::UnitY(), q[4]);
+    const Vec3 tip = q.head<3>() + c * (Vec3(30, 0, 0) + b * Vec3(-30, 0, q[5] - 200));
+    const CutterLocation location = forward_location(chain, q);
+    CHECK((location.axis - c * b * Vec3::UnitZ()).norm() < 1e-12);
+    CHECK((location.tip - tip).norm() < 1e-9);
+  }
+  for (const AxisDefinition& a : plain.axes) {
+    INFO(a.name);
+    const AxisDefinition& other = axis(machine, a.name);
+    CHECK(other.joint.lower == a.joint.lower);
+    CHECK(other.joint.upper == a.joint.upper);
+    CHECK(other.velocity == a.velocity);
+    CHECK(other.acceleration == a.acceleration);
+    CHECK(other.jerk == a.jerk);
+  }
+}
+
+TEST_CASE("robot_6r: ranges and speeds of the data sheet", "[machines][definition]") {
+  const MachineDefinition machine = shipped("robot_6r");
+  struct Row {
+    const char* name;
+    double lower, upper, velocity;
+  };
+  const Row rows[] = {{"A1", -185, 185, 128}, {"A2", -135, 35, 102},  {"A3", -120, 158, 128},
+                      {"A4", -350, 350, 260}, {"A5", -119, 119, 245}, {"A6", -350, 350, 322}};
+  REQUIRE(machine.size() == 6);
+  for (const Row& row : rows) {
+    INFO(row.name);
+    const AxisDefinition& a = axis(machine, row.name);
+    CHECK(degrees_from_radians(a.joint.lower) == Approx(row.lower).epsilon(1e-14));
+    CHECK(degrees_from_radians(a.joint.upper) == Approx(row.upper).epsilon(1e-14));
+    CHECK(degrees_from_radians(a.velocity) == Approx(row.velocity).epsilon(1e-14));
+    CHECK_FALSE(a.joint.redundant);
+  }
+  CHECK(machine.dialect.name == "krl");
+  CHECK(machine.recipe.kind == "robot");
+}
+
 TEST_CASE("table-table machines: the table turns as LinuxCNC's trt kinematics says",
           "[machines][definition]") {
   std::mt19937 random(11);
@@ -205,18 +263,26 @@ TEST_CASE(
 
 TEST_CASE("shipped machines: a laser knows no milling words and a mill no beam",
           "[machines][definition]") {
-  const MachineDefinition laser = shipped("laser_5p1");
-  for (const char* event : {"spindle_on", "spindle_on_reverse", "spindle_off", "coolant_on",
-                            "coolant_mist", "coolant_off", "tool_change"}) {
-    INFO(event);
-    CHECK_FALSE(laser.has_event(event));
-    for (const char* name : {"table_table_ac", "table_table_bc"})
-      CHECK(shipped(name).has_event(event));
+  for (const char* laser_name : {"laser_5p1", "laser_5p1_offset"}) {
+    const MachineDefinition laser = shipped(laser_name);
+    for (const char* event : {"spindle_on", "spindle_on_reverse", "spindle_off", "coolant_on",
+                              "coolant_mist", "coolant_off", "tool_change"}) {
+      INFO(event);
+      CHECK_FALSE(laser.has_event(event));
+    }
+    for (const char* event : {"beam_on", "beam_off", "pierce", "power", "gas_on", "follow_on"}) {
+      INFO(event);
+      CHECK(laser.has_event(event));
+    }
   }
-  for (const char* event : {"beam_on", "beam_off", "pierce", "power", "gas_on", "follow_on"}) {
-    INFO(event);
-    CHECK(laser.has_event(event));
-    for (const char* name : {"table_table_ac", "table_table_bc"})
-      CHECK_FALSE(shipped(name).has_event(event));
+  for (const char* name : {"table_table_ac", "table_table_bc", "table_table_b45c", "head_table_bc",
+                           "head_head_ca", "finish_2p2r_1p1r", "robot_6r"}) {
+    INFO(name);
+    const MachineDefinition mill = shipped(name);
+    for (const char* event : {"spindle_on", "spindle_on_reverse", "spindle_off", "coolant_on",
+                              "coolant_off", "tool_change"})
+      CHECK(mill.has_event(event));
+    for (const char* event : {"beam_on", "beam_off", "pierce", "power", "gas_on", "follow_on"})
+      CHECK_FALSE(mill.has_event(event));
   }
 }
