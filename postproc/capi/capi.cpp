@@ -55,6 +55,7 @@ Options options_of(const smoothpost_options& o) {
   out.dialect = text(o.dialect);
   out.input_format = text(o.input_format);
   out.input_dialect = text(o.input_dialect);
+  out.integer_unit = text(o.integer_unit);
   out.input_machine = text(o.input_machine);
   out.process = text(o.process);
   out.work_offset = list(o.work_offset, o.work_offset_count);

@@ -80,6 +80,7 @@ struct CallOptions {
     c.dialect = or_null(l.dialect);
     c.input_format = or_null(l.input_format);
     c.input_dialect = or_null(l.input_dialect);
+    c.integer_unit = or_null(l.integer_unit);
     c.input_machine = or_null(l.input_machine);
     c.process = or_null(l.process);
     c.work_offset = work_offset.data();

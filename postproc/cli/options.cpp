@@ -44,7 +44,10 @@ void add_part_options(CLI::App* app, CommandLine& l) {
 // How a CAM program is to be read, and how closely it is to be followed.
 void add_input_options(CLI::App* app, CommandLine& l) {
   app->add_option("--input-format", l.input_format, "nc | csv");
-  app->add_option("--input-dialect", l.input_dialect, "linuxcnc");
+  app->add_option("--input-dialect", l.input_dialect,
+                  "linuxcnc | fanuc | haas | siemens; found out when only one fits");
+  app->add_option("--integer-unit", l.integer_unit,
+                  "fanuc, haas: what one unit of a number without point is, 1 or 0.001 (mm, deg)");
   app->add_option("--input-machine", l.input_machine,
                   "the machine that the input was posted for; needed for rotary words");
   app->add_option("--process", l.process,
@@ -75,8 +78,9 @@ void add_convert(CLI::App& app, CommandLine& l) {
   c->add_option("--orientation", l.orientation, "programmed");
   c->add_option("--optimise", l.optimise, "none");
   c->add_option("--schedule", l.schedule, "programmed");
-  c->add_option("--links", l.links, "keep");
-  c->add_option("--cuts", l.cuts, "a later version");
+  c->add_option("--links", l.links,
+                "plan (default): motion between cuts is ours | keep: the input's");
+  c->add_option("--cuts", l.cuts, "7, 7-40 or 7-: only these cuts, with a start of their own");
   c->add_option("--trajectory", l.trajectory,
                 "write joint samples at the machine's cycle to FILE.csv");
   c->add_option("--line-map", l.line_map, "write output line -> input line to FILE.json");
@@ -96,7 +100,7 @@ void add_check(CLI::App& app, CommandLine& l) {
   add_output_options(c, l);
 }
 
-void add_words(CLI::App& app, CommandLine& l, const char* name, const char* help) {
+CLI::App* add_words(CLI::App& app, CommandLine& l, const char* name, const char* help) {
   auto* c = app.add_subcommand(name, help);
   c->add_option("words", l.arguments, "what to do");
   c->add_option("--machine-path", l.machine_path, "folders of machines, separated by ':'");
@@ -105,6 +109,7 @@ void add_words(CLI::App& app, CommandLine& l, const char* name, const char* help
       ->allow_extra_args(false);
   c->add_option("--diagnostics", l.diagnostics, "text | json")
       ->check(CLI::IsMember({"text", "json"}));
+  return c;
 }
 
 }  // namespace
@@ -118,7 +123,11 @@ Parsed parse_command_line(int argc, char** argv) {
   app.require_subcommand(1);
   add_convert(app, l);
   add_check(app, l);
-  add_words(app, l, "machines", "list | show NAME | validate FILE");
+  auto* machines =
+      add_words(app, l, "machines", "list | show NAME | validate FILE | test-program NAME");
+  machines->add_option("-o,--output", l.output, "test-program: the program; - for standard output");
+  machines->add_option("--tool", l.tool, "test-program: N=length in mm of the tool in the holder")
+      ->allow_extra_args(false);
   add_words(app, l, "formats", "input formats and output dialects");
   add_words(app, l, "golden", "run DIR | update DIR: sample programs as regression cases");
   try {

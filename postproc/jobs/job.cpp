@@ -74,6 +74,10 @@ class Run {
     std::optional<Pose> placement = read_placement(std::nullopt);
     if (!placement || !read_part(in.part, in.part_name)) return finish();
     in.placement = *placement;
+    const auto tools = read_tools(options_.tool);
+    add(tools.diagnostics());
+    if (!tools.ok()) return finish();
+    if (!tools.value().empty()) in.tool_length = tools.value().begin()->second;
     in.text = std::move(input_bytes_);
     if (!options_.against.empty() && !read_against(in)) return finish();
     in.file_name = input_name_;
@@ -100,9 +104,6 @@ class Run {
     refuse(options_.report, "--report");
     if (!options_.links.empty() && options_.links != "plan" && options_.links != "keep")
       add(usage_error("US148", "--links " + options_.links + ": expected is plan or keep"));
-    if (!options_.input_dialect.empty() && options_.input_dialect != "linuxcnc")
-      add(usage_error("US122", "--input-dialect " + options_.input_dialect +
-                                   " is not read in this version; possible: linuxcnc"));
     return !has_error(result_.diagnostics);
   }
 
@@ -190,17 +191,37 @@ class Run {
       return {};
     }
     context_.input_format = format->name;
-    context_.input_dialect = format->has_words ? "linuxcnc" : "";
     InputSettings settings;
     settings.file_name = name;
     if (!input_settings(settings)) return {};
     auto read = format->read(std::move(bytes), settings);
     add(read.diagnostics());
     if (!read.ok()) return {};
+    context_.input_dialect = read.value().dialect;
     return std::move(read.value());
   }
 
+  bool read_dialect(InputSettings& settings) {
+    if (!options_.input_dialect.empty()) {
+      settings.dialect = input_dialect(options_.input_dialect);
+      if (!settings.dialect) {
+        add(usage_error("US122", "--input-dialect " + options_.input_dialect +
+                                     " is not read in this version; possible: linuxcnc, fanuc, "
+                                     "haas, siemens"));
+        return false;
+      }
+    }
+    if (options_.integer_unit.empty()) return true;
+    settings.integer_unit = read_number(options_.integer_unit);
+    if (settings.integer_unit && (*settings.integer_unit == 1.0 || *settings.integer_unit == 0.001))
+      return true;
+    add(usage_error("US150", "--integer-unit " + options_.integer_unit +
+                                 ": expected is 1 (X10 is 10 mm) or 0.001 (X10 is 0.010 mm)"));
+    return false;
+  }
+
   bool input_settings(InputSettings& settings) {
+    if (!read_dialect(settings)) return false;
     if (!options_.input_machine.empty()) {
       auto machine = load_machine(options_.input_machine, options_, {});
       add(machine.diagnostics());
@@ -325,13 +346,15 @@ class Run {
     lines.push_back(std::string("smoothpost ") + kVersion + " for machine " +
                     machine_.definition.name);
     lines.push_back("input " + base_name(input_name_) + " sha256 " + context_.input_sha256);
-    lines.push_back("machine joints. " + in.placement_text);
+    const bool by_tool = machine_.definition.dialect.mode == "tcp";
+    lines.push_back((by_tool ? "tool tip in the part. " : "machine joints. ") + in.placement_text);
     std::map<int, double> tools;
     for (const auto& p : in.input.path.points)
       if (p.tool > 0) tools[p.tool] = p.tool_length;
     for (const auto& [tool, length] : tools)
-      lines.push_back("tool " + std::to_string(tool) + ": length " + decimal(length, 4) +
-                      " mm is in the joint values");
+      lines.push_back(
+          "tool " + std::to_string(tool) + ": length " + decimal(length, 4) +
+          (by_tool ? " mm, as the control has to have it" : " mm is in the joint values"));
     return lines;
   }
 

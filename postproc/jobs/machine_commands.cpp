@@ -6,8 +6,10 @@
 
 #include "kernels/core/units.h"
 #include "machines/dialects/decimal.h"
+#include "postproc/jobs/files.h"
 #include "postproc/jobs/settings.h"
 #include "postproc/pipeline/registry.h"
+#include "postproc/pipeline/test_program.h"
 
 namespace smoothpost {
 
@@ -79,13 +81,50 @@ JobResult list(const Options& options) {
   return result;
 }
 
+/// Makes, reads back, checks and writes the test program of a machine.
+void write_test_program(const MachineDefinition& machine, const Options& options,
+                        JobResult& result) {
+  const auto add = [&result](const Diagnostics& list) {
+    result.diagnostics.insert(result.diagnostics.end(), list.begin(), list.end());
+    result.status = status_of(result.diagnostics);
+  };
+  const auto tools = read_tools(options.tool);
+  add(tools.diagnostics());
+  if (!tools.ok()) return;
+  const double length = tools.value().empty() ? 0.0 : tools.value().begin()->second;
+  const auto test = make_test_program(machine, length);
+  add(test.diagnostics());
+  if (!test.ok()) return;
+  const Dialect* dialect = find_dialect(machine.dialect.name);
+  const auto emitted = dialect->emit(machine, test.value().program);
+  add(emitted.diagnostics());
+  if (!emitted.ok()) return;
+  const auto read = dialect->read_back(machine, emitted.value().text, "test program");
+  add(read.diagnostics());
+  if (!read.ok()) return;
+  for (const Check& c : check_test_program(read.value(), machine, test.value()))
+    if (!c.ok)
+      add({usage_error("CK101", "check " + c.name + " of the test program failed: " + c.note)});
+  if (has_error(result.diagnostics)) return;
+  result.program = emitted.value().text;
+  if (options.output == "-") return;
+  result.program_path =
+      options.output.empty() ? machine.name + "_test." + machine.dialect.extension : options.output;
+  add(write_file(result.program_path, result.program));
+  result.summary = "test program of machine " + machine.name + " with tool length ";
+  append_decimal(result.summary, length, 3);
+  result.summary += " mm: " + std::to_string(read.value().moves.size()) +
+                    " slow moves, checked from its own text";
+}
+
 }  // namespace
 
 JobResult run_machines_command(const Options& options) {
   const auto& words = options.arguments;
   if (words.empty() || words[0] == "list") return list(options);
-  if (words.size() != 2 || (words[0] != "show" && words[0] != "validate"))
-    return usage("machines: list, show NAME or validate FILE");
+  if (words.size() != 2 ||
+      (words[0] != "show" && words[0] != "validate" && words[0] != "test-program"))
+    return usage("machines: list, show NAME, validate FILE or test-program NAME");
   JobResult result;
   const auto overrides = overrides_of(options);
   if (!overrides.ok()) {
@@ -106,6 +145,10 @@ JobResult run_machines_command(const Options& options) {
         usage_error("US121", "no output dialect \"" + machine.value().definition.dialect.name +
                                  "\" in this version: `smoothpost formats` lists them"));
     result.status = ExitStatus::usage;
+    return result;
+  }
+  if (words[0] == "test-program") {
+    write_test_program(machine.value().definition, options, result);
     return result;
   }
   result.text = machine.value().path + ": valid, machine " + machine.value().definition.name +

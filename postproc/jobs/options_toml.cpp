@@ -21,6 +21,7 @@ const std::map<std::string, std::string Options::*>& text_options() {
       {"dialect", &Options::dialect},
       {"input_format", &Options::input_format},
       {"input_dialect", &Options::input_dialect},
+      {"integer_unit", &Options::integer_unit},
       {"input_machine", &Options::input_machine},
       {"process", &Options::process},
       {"tip_tolerance", &Options::tip_tolerance},

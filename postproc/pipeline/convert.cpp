@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <set>
 
 #include "kernels/core/units.h"
 #include "kernels/geometry/part_registration.h"
 #include "kernels/geometry/triangle_tree.h"
+#include "postproc/pipeline/arm_plan.h"
+#include "postproc/pipeline/controller_motion.h"
 #include "postproc/pipeline/joint_plan.h"
 #include "postproc/pipeline/machine_program.h"
 #include "postproc/pipeline/path_match.h"
@@ -16,6 +19,9 @@
 namespace smoothpost {
 
 namespace {
+
+constexpr int kMostSplitRounds = 30;
+constexpr double kStepShare = 0.02;  // of the tolerances, between a tool move and its joint steps
 
 class Stopwatch {
  public:
@@ -131,6 +137,34 @@ class PartCheck {
   Result<TriangleTree> tree_;
 };
 
+/// Tool moves as seen in the part: where the text states its own frames (BASE, work offset, TOOL)
+/// with their printed digits, these count and not what we meant.
+void into_part(ReadBack& read, const MachineDefinition& machine, const Pose& part,
+               const std::function<double(std::size_t)>& tool_length) {
+  if (!read.part && !read.tool_frame) return;
+  const Pose base = read.part ? part.inverse() * *read.part : Pose::Identity();
+  for (std::size_t i = 0; i < read.moves.size(); ++i) {
+    ReadBackMove& move = read.moves[i];
+    if (move.interpolation != MoveInterpolation::tool) continue;
+    move.tool = base * move.tool;
+    if (!read.tool_frame) continue;
+    Pose tip = Pose::Identity();
+    tip.translation() = machine.tool.tip - tool_length(i) * machine.tool.axis;
+    move.tool = move.tool * read.tool_frame->inverse() * (machine.tool.flange.inverse() * tip);
+  }
+}
+
+Result<ControllerMotion> follow(ReadBack read, const MachineDefinition& machine,
+                                const Inverse& inverse, ToolTurn turn,
+                                const std::function<double(std::size_t)>& tool_length) {
+  FollowSettings settings;
+  settings.turn = turn;
+  settings.tip_tolerance = kStepShare * machine.tolerance.tip;
+  settings.axis_tolerance = kStepShare * machine.tolerance.axis;
+  settings.tool_length = tool_length;
+  return follow_controller(std::move(read), inverse, settings);
+}
+
 /// Fills what does not depend on how the program was made.
 void describe_input(const ToolPath& path, const std::vector<Cut>& cuts,
                     const ReferencePath& reference, Conversion& out) {
@@ -164,10 +198,8 @@ void describe_promises(const MachineDefinition& machine, bool has_part, Conversi
                    share.rounding * tip, share.controller * tip};
   out.assumes.push_back(
       "the machine is as its definition file says: axes, pivots and tool are calibrated");
-  if (machine.dialect.offset_guard)
-    out.assumes.push_back(
-        "every work, G92 and tool offset of the controller is zero: the program aborts "
-        "before its first motion otherwise");
+  if (const Dialect* dialect = find_dialect(machine.dialect.name))
+    if (machine.dialect.offset_guard) out.assumes.push_back(dialect->guard);
   out.not_checked.push_back("clearance");
   out.not_checked.push_back("acceleration_limit");
   out.not_checked.push_back("jerk_limit");
@@ -259,27 +291,40 @@ class Converter {
     if (r.schedule != "programmed") refuse("recipe.schedule", r.schedule, "programmed");
     if (in_.machine.tolerance.lead != 0.0 || in_.machine.tolerance.tilt != 0.0)
       refuse("tolerance.lead_deg and tilt_deg", "free", "0 (the programmed tool axis is kept)");
-    if (in_.machine.dialect.mode != "joint")
-      refuse("dialect.mode", in_.machine.dialect.mode, "joint");
+    dialect_ = find_dialect(in_.machine.dialect.name);
+    if (!dialect_) {
+      out_.diagnostics.push_back(
+          diagnostic("US121", "no output dialect \"" + in_.machine.dialect.name +
+                                  "\" in this version: `smoothpost formats` lists them"));
+      return false;
+    }
+    if (in_.machine.dialect.mode == "tcp") turn_ = dialect_->tool_turn;
+    if (in_.machine.dialect.mode == "joint" && !dialect_->joints_linear)
+      refuse("dialect.mode", "joint",
+             "tcp (between the ends of its joint moves nothing is known of this controller)");
+    if (in_.machine.dialect.mode == "tcp" && turn_ == ToolTurn::none)
+      refuse("dialect.mode", "tcp", "joint (this dialect has no tool-centre-point mode)");
     if (in_.machine.dialect.path_mode != "exact")
       refuse("dialect.path_mode", in_.machine.dialect.path_mode, "exact");
     return !has_error(out_.diagnostics);
   }
 
   bool has_cuts() {
-    const auto first = std::find_if(cuts_.begin(), cuts_.end(),
-                                    [](const Cut& c) { return !c.omitted; });
+    const auto first =
+        std::find_if(cuts_.begin(), cuts_.end(), [](const Cut& c) { return !c.omitted; });
     if (first != cuts_.end()) return true;
     if (in_.cuts)
-      out_.diagnostics.push_back(diagnostic(
-          "US147", "--cuts asks for none of the program's " + std::to_string(cuts_.size()) +
-                       " cuts (they count from 1)", in_.input_name));
+      out_.diagnostics.push_back(diagnostic("US147",
+                                            "--cuts asks for none of the program's " +
+                                                std::to_string(cuts_.size()) +
+                                                " cuts (they count from 1)",
+                                            in_.input_name));
     else if (!in_.keep_links)
       out_.diagnostics.push_back(diagnostic(
-          "PR310", "the program cuts nowhere: it has no feed motion" +
-                       std::string(in_.machine.has_event(event_name::kBeamOn)
-                                       ? " with the beam on" : "") +
-                       ", only rapids. Use --links keep to convert its rapids as they are",
+          "PR310",
+          "the program cuts nowhere: it has no feed motion" +
+              std::string(in_.machine.has_event(event_name::kBeamOn) ? " with the beam on" : "") +
+              ", only rapids. Use --links keep to convert its rapids as they are",
           in_.input_name));
     return in_.keep_links && !in_.cuts;
   }
@@ -291,11 +336,13 @@ class Converter {
       out_.diagnostics.back().severity = Severity::warning;
     };
     if (in_.keep_links)
-      warn("LK102", "links are the input's own rapids, on your word (--links keep): nothing was "
-                    "checked of where they pass on this machine");
+      warn("LK102",
+           "links are the input's own rapids, on your word (--links keep): nothing was "
+           "checked of where they pass on this machine");
     else if (!in_.part)
-      warn("LK101", "no part was given (-w PART.stl): links go over the retract plane, and nothing "
-                    "was checked against the part (clearance)");
+      warn("LK101",
+           "no part was given (-w PART.stl): links go over the retract plane, and nothing "
+           "was checked against the part (clearance)");
     if (in_.cuts)
       out_.assumes.push_back("only cuts " + std::to_string(in_.cuts->first) + " to " +
                              std::to_string(std::min<int>(in_.cuts->last, cuts_.back().number)) +
@@ -321,13 +368,21 @@ class Converter {
 
   bool plan() {
     chain_ = placed_chain(in_.machine, in_.placement);
-    const auto pair = RotaryPair::from(chain_);
-    if (!pair) {
+    inverse_ = Inverse::from(chain_);
+    if (!inverse_) {
       out_.diagnostics.push_back(diagnostic(
           "KN110",
           "machine " + in_.machine.name +
               " has no closed form in this version: two free rotary and three free linear axes "
-              "are needed, further axes redundant = true"));
+              "are needed (further axes redundant = true), or a six-axis arm with spherical "
+              "wrist"));
+      return false;
+    }
+    if (inverse_->takes_rotation() && turn_ == ToolTurn::great_circle) {
+      out_.diagnostics.push_back(
+          diagnostic("KN111", "dialect " + in_.machine.dialect.name +
+                                  " says only the tool axis in its tcp mode, and machine " +
+                                  in_.machine.name + " also turns about it: use mode = \"joint\""));
       return false;
     }
     const auto& tolerance = in_.machine.tolerance;
@@ -338,17 +393,32 @@ class Converter {
     settings.file_name = in_.input_name;
     for (const auto& axis : in_.machine.axes) settings.axis_names.push_back(axis.name);
     settings.may_split = in_.machine.links.rewind_in_cut;
-    auto planned = plan_joints(reference_, *pair, settings, progress_);
-    if (planned.ok() && !planned.value().splits.empty()) {
+    settings.tool_moves = turn_ != ToolTurn::none;
+    settings.spin = in_.machine.recipe.spin;
+    auto planned = plan_with(settings);
+    // The second half starts a little before the place, so that it may need a split of its own.
+    for (int round = 1; planned.ok() && !planned.value().splits.empty(); ++round) {
       split(planned.value().splits);
-      settings.may_split = false;
-      planned = plan_joints(reference_, *pair, settings, progress_);
+      settings.may_split = round < kMostSplitRounds;
+      planned = plan_with(settings);
     }
+    tell_splits();
     append(out_.diagnostics, planned.diagnostics());
     watch_.lap("kinematics");
     if (!planned.ok()) return false;
-    program_ = build_program({path_, cuts_, in_.machine, chain_, part_box()},
-                             planned.value().samples);
+    BuiltProgram built =
+        build_program({path_, cuts_, in_.machine, chain_, part_box(), turn_, &*inverse_},
+                      planned.value().samples);
+    program_ = std::move(built.program);
+    if (!built.cramped.empty()) {
+      out_.diagnostics.push_back(diagnostic(
+          "LK104",
+          "a link has no room for the whole clearance of " + number(in_.machine.links.clearance) +
+              " mm along the tool axis, here and at " + std::to_string(built.cramped.size() - 1) +
+              " other places",
+          in_.input_name, static_cast<int>(built.cramped.front())));
+      out_.diagnostics.back().severity = Severity::warning;
+    }
     program_.part = chain_.workpiece_home;
     program_.tool_length = path_.points.back().tool_length;
     program_.title = in_.title;
@@ -356,17 +426,30 @@ class Converter {
     return true;
   }
 
+  Result<JointPlan> plan_with(const JointPlanSettings& settings) const {
+    if (const RotaryPair* pair = inverse_->rotary_pair())
+      return plan_joints(reference_, *pair, settings, progress_);
+    return plan_arm(reference_, *inverse_->six_r(), settings, progress_);
+  }
+
   void split(const std::vector<SplitPlace>& places) {
-    std::string lines;
-    for (const auto& place : places)
-      lines += (lines.empty() ? "" : ", ") + std::to_string(path_.points[place.segment].line);
+    for (const auto& place : places) split_lines_.push_back(path_.points[place.segment].line);
     split_cuts(path_, cuts_, in_.input.frames, places, in_.machine.links.over_burn);
+  }
+
+  void tell_splits() {
+    if (split_lines_.empty()) return;
+    std::sort(split_lines_.begin(), split_lines_.end());
+    std::string lines;
+    for (std::size_t i = 0; i < std::min<std::size_t>(split_lines_.size(), 8); ++i)
+      lines += (i ? ", " : "") + std::to_string(split_lines_[i]);
+    if (split_lines_.size() > 8)
+      lines += " and " + std::to_string(split_lines_.size() - 8) + " more";
     out_.assumes.push_back("cuts are split to unwind an axis (links.rewind = \"in_cut\") and cut " +
-                           number(in_.machine.links.over_burn) +
-                           " mm twice there: input lines " + lines);
-    out_.diagnostics.push_back(
-        diagnostic("LK103", out_.assumes.back(), in_.input_name,
-                   static_cast<int>(path_.points[places.front().segment].line)));
+                           number(in_.machine.links.over_burn) + " mm twice there: input lines " +
+                           lines);
+    out_.diagnostics.push_back(diagnostic("LK103", out_.assumes.back(), in_.input_name,
+                                          static_cast<int>(split_lines_.front())));
     out_.diagnostics.back().severity = Severity::warning;
   }
 
@@ -381,19 +464,12 @@ class Converter {
   }
 
   bool emit() {
-    const Dialect* dialect = find_dialect(in_.machine.dialect.name);
-    if (!dialect) {
-      out_.diagnostics.push_back(
-          diagnostic("US121", "no output dialect \"" + in_.machine.dialect.name +
-                                  "\" in this version: `smoothpost formats` lists them"));
-      return false;
-    }
-    dialect_ = dialect;
-    out_.interpolation = dialect->interpolation;
-    auto emitted = dialect->emit(in_.machine, program_);
+    out_.interpolation = dialect_->interpolation;
+    auto emitted = dialect_->emit(in_.machine, program_);
+    std::set<std::string> told;  // a state that is stated again at every cut is told once
     for (auto d : emitted.diagnostics()) {
       if (d.where.file.empty()) d.where.file = in_.input_name;
-      out_.diagnostics.push_back(std::move(d));
+      if (told.insert(to_string(d)).second) out_.diagnostics.push_back(std::move(d));
     }
     watch_.lap("emit");
     if (!emitted.ok()) return false;
@@ -410,17 +486,33 @@ class Converter {
       out_.diagnostics.push_back(diagnostic("IN110", "the program could not be read back"));
       return false;
     }
-    out_.read = std::move(read.value());
-    Verification machine = verify_machine(out_.read, in_.machine);
+    const auto tool_length = [this](std::size_t i) {
+      return i < program_.moves.size() ? program_.moves[i].tool_length : 0.0;
+    };
+    into_part(read.value(), in_.machine, program_.part, tool_length);
+    auto followed = follow(std::move(read.value()), in_.machine, *inverse_, turn_, tool_length);
+    for (auto d : followed.diagnostics()) {
+      d.where.file = "output";
+      out_.diagnostics.push_back(std::move(d));
+    }
+    if (!followed.ok()) return false;
+    ControllerMotion motion = std::move(followed.value());
+    Verification machine = verify_machine(motion.joints(), in_.machine);
     const Checks deviation = verify_deviation(
-        out_.read, in_.machine, {reference_, out_.line_map, program_, chain_}, progress_);
+        motion.read, in_.machine, {reference_, out_.line_map, program_, chain_, turn_, part_box()},
+        progress_);
+    out_.blocks = motion.read.moves.size();
+    if (turn_ != ToolTurn::none)
+      out_.assumes.push_back(
+          "on moves of the tool the control takes the joints to the nearest solution, from the "
+          "joint positions that the program has stated before");
+    out_.read = motion.steps ? std::move(*motion.steps) : std::move(motion.read);
     out_.checks.insert(out_.checks.end(), deviation.begin(), deviation.end());
     if (part_ && part_->ok()) out_.checks.push_back(part_->output(out_.read, chain_));
     out_.checks.insert(out_.checks.end(), machine.checks.begin(), machine.checks.end());
     out_.axes = std::move(machine.axes);
     out_.scheduled_time = machine.scheduled_time;
     for (Check& c : out_.checks) give_input_line(c);
-    out_.blocks = out_.read.moves.size();
     watch_.lap("verify");
     return true;
   }
@@ -487,8 +579,11 @@ class Converter {
   ReferencePath reference_;
   ScrewChain chain_;
   MachineProgram program_;
+  std::vector<std::uint32_t> split_lines_;
   std::optional<PartCheck> part_;
+  std::optional<Inverse> inverse_;
   const Dialect* dialect_ = nullptr;
+  ToolTurn turn_ = ToolTurn::none;
 };
 
 }  // namespace
@@ -527,6 +622,40 @@ Checks shape_checks(const CheckInput& in, const ReadBack& read, const ScrewChain
           check("axis_deviation", degrees_from_radians(tolerance.axis), "deg")};
 }
 
+/// Joints of tool moves; the tool's length is the one that the program's own tool frame has, or the
+/// one that the user gave.
+bool follow_program(const CheckInput& in, const ScrewChain& chain, const Dialect& dialect,
+                    ReadBack read, Conversion& out) {
+  const bool any = std::any_of(read.moves.begin(), read.moves.end(), [](const ReadBackMove& m) {
+    return m.interpolation == MoveInterpolation::tool;
+  });
+  const auto inverse = Inverse::from(chain);
+  if (!any || !inverse) {
+    out.read = std::move(read);
+    if (any)
+      out.diagnostics.push_back(
+          diagnostic("KN110", "machine " + in.machine.name +
+                                  " has no closed form: its joints on tool moves "
+                                  "are not known in this version"));
+    return !any;
+  }
+  double length = in.tool_length;
+  if (read.tool_frame)
+    length = -in.machine.tool.axis.dot((in.machine.tool.flange * *read.tool_frame).translation() -
+                                       in.machine.tool.tip);
+  const auto tool_length = [length](std::size_t) { return length; };
+  into_part(read, in.machine, chain.workpiece_home, tool_length);
+  auto followed = follow(std::move(read), in.machine, *inverse, dialect.tool_turn, tool_length);
+  for (auto d : followed.diagnostics()) {
+    d.where.file = in.file_name;
+    out.diagnostics.push_back(std::move(d));
+  }
+  if (!followed.ok()) return false;
+  ControllerMotion& motion = followed.value();
+  out.read = motion.steps ? std::move(*motion.steps) : std::move(motion.read);
+  return true;
+}
+
 void tell_failed_checks(Conversion& out, const std::string& file) {
   for (const Check& c : out.checks)
     if (!c.ok)
@@ -561,12 +690,12 @@ Conversion check_program(const CheckInput& in, const Progress& progress) {
   append(out.diagnostics, read.diagnostics());
   watch.lap("read back");
   if (!read.ok()) return out;
-  out.read = std::move(read.value());
+  const ScrewChain chain = placed_chain(in.machine, in.placement);
+  out.blocks = read.value().moves.size();
+  if (!follow_program(in, chain, *dialect, std::move(read.value()), out)) return out;
   Verification machine = verify_machine(out.read, in.machine);
   out.axes = std::move(machine.axes);
   out.scheduled_time = machine.scheduled_time;
-  out.blocks = out.read.moves.size();
-  const ScrewChain chain = placed_chain(in.machine, in.placement);
   if (in.against) {
     out.checks = shape_checks(in, out.read, chain, progress);
     out.reference = in.against->reference;

@@ -83,6 +83,7 @@ struct CheckInput {
   Pose placement = Pose::Identity();
   std::optional<TriangleMesh> part;
   std::string part_name;
+  double tool_length = 0.0;                 ///< mm, for programs that leave it to the control
   std::optional<InterpretedInput> against;  ///< the input that the program is to follow
 };
 

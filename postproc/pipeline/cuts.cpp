@@ -77,15 +77,27 @@ class Partition {
     for (std::size_t k = begin; k < end; ++k) {
       const PathPoint& p = path_.points[k];
       if (p.kind != MotionKind::feed || p.replanned) return false;
-      length += (p.location.tip - path_.points[k - 1].location.tip).norm();
+      length += length_of(k);
     }
     return length <= choice_.micro_joint && only_beam_events(begin - 1, end - 1);
   }
 
+  // The way of the tip, mm.
+  double length_of(std::size_t k) const {
+    const PathPoint& from = path_.points[k - 1];
+    const PathPoint& to = path_.points[k];
+    if (!to.is_arc) return (to.location.tip - from.location.tip).norm();
+    const ArcGeometry& arc = path_.arcs[static_cast<std::size_t>(to.arc)];
+    const Vec3 start(from.words[0], from.words[1], from.words[2]);
+    const Vec3 end(to.words[0], to.words[1], to.words[2]);
+    const double radius = arc.normal.cross(start - arc.centre).norm();
+    return std::hypot(radius * arc.sweep, arc.normal.dot(end - start));
+  }
+
   bool only_beam_events(std::size_t first, std::size_t last) const {
-    const auto from = std::lower_bound(
-        path_.events.begin(), path_.events.end(), first,
-        [](const PathEvent& e, std::size_t point) { return e.point < point; });
+    const auto from =
+        std::lower_bound(path_.events.begin(), path_.events.end(), first,
+                         [](const PathEvent& e, std::size_t point) { return e.point < point; });
     for (auto e = from; e != path_.events.end() && e->point <= last; ++e) {
       if (e->kind == PathEvent::Kind::comment) continue;
       if (e->kind == PathEvent::Kind::dwell) return false;
@@ -137,17 +149,16 @@ class Partition {
   // Keeps, of each run of events that no selected cut touches, what its end state needs.
   void thin_events(const std::vector<bool>& left_out) {
     std::vector<PathEvent> kept;
-    std::map<std::string, PathEvent> state;
+    std::map<std::string, std::size_t> state;  // group -> its last event
     const auto flush = [&] {
-      std::vector<PathEvent> last;
-      for (auto& [group, event] : state) last.push_back(std::move(event));
-      std::stable_sort(last.begin(), last.end(), [](const PathEvent& a, const PathEvent& b) {
-        return a.point < b.point;
-      });
-      kept.insert(kept.end(), last.begin(), last.end());
+      std::vector<std::size_t> last;
+      for (const auto& [group, event] : state) last.push_back(event);
+      std::sort(last.begin(), last.end());  // program order
+      for (const std::size_t i : last) kept.push_back(path_.events[i]);
       state.clear();
     };
-    for (PathEvent& e : path_.events) {
+    for (std::size_t i = 0; i < path_.events.size(); ++i) {
+      PathEvent& e = path_.events[i];
       if (!left_out[e.point]) {
         flush();
         kept.push_back(std::move(e));
@@ -155,7 +166,7 @@ class Partition {
       }
       if (e.kind != PathEvent::Kind::process) continue;
       const std::string group = state_group(e.event.name);
-      if (!group.empty()) state.insert_or_assign(group, e);
+      if (!group.empty()) state.insert_or_assign(group, i);
     }
     flush();
     path_.events = std::move(kept);
@@ -220,7 +231,10 @@ std::pair<std::size_t, std::size_t> closing_pair(const ReferencePath& reference,
       if (found == first_in.end()) continue;
       const std::size_t k = found->second;
       const Vec3& q = reference.path().points[cut.first - 1 + k].location.tip;
-      if ((p - q).norm() > kClosed || length.at_point(i) - length.at_point(k) <= longest) continue;
+      // Over an over-burn each pair is as long: the first is the contour's, whatever rounding says.
+      if ((p - q).norm() > kClosed ||
+          length.at_point(i) - length.at_point(k) <= longest + (best.second > 0 ? kClosed : 0.0))
+        continue;
       longest = length.at_point(i) - length.at_point(k);
       best = {k, i};
     }
@@ -256,8 +270,7 @@ CutPhases phases_of(const ReferencePath& reference, const Cut& cut) {
 }
 
 std::string state_group(const std::string& event) {
-  if (event == event_name::kBeamOn || event == event_name::kBeamOff ||
-      event == event_name::kPierce)
+  if (event == event_name::kBeamOn || event == event_name::kBeamOff || event == event_name::kPierce)
     return {};
   if (event == event_name::kPower) return "power";
   if (event == event_name::kToolChange) return "tool";
@@ -287,9 +300,9 @@ Result<CutRange> parse_cut_range(const std::string& text) {
   const auto dash = text.find('-');
   CutRange range;
   range.first = number(std::string_view(text).substr(0, dash));
-  range.last = dash == std::string::npos      ? range.first
-               : dash + 1 == text.size()      ? std::numeric_limits<int>::max()
-                                              : number(std::string_view(text).substr(dash + 1));
+  range.last = dash == std::string::npos ? range.first
+               : dash + 1 == text.size() ? std::numeric_limits<int>::max()
+                                         : number(std::string_view(text).substr(dash + 1));
   if (range.first == 0 || range.last < range.first) return refuse();
   return Result<CutRange>(range);
 }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "postproc/pipeline/tool_motion.h"
+
 namespace smoothpost {
 
 namespace {
@@ -34,10 +36,10 @@ Place ahead(const MachineProgram& program, const MachineDefinition& machine, std
   const std::size_t before = program.actions[a].before;
   Place place{before, 0.0, a};
   // A stop at the same place, or at one that is passed on the way, is the earliest.
-  std::size_t floor = 0;
+  std::size_t floor = 1;  // where the first move starts is not known
   for (std::size_t k = a; k-- > 0;)
     if (stops(machine, program.actions[k])) {
-      floor = program.actions[k].before;
+      floor = std::max(floor, program.actions[k].before);
       break;
     }
   double left = latency;
@@ -56,7 +58,7 @@ Place ahead(const MachineProgram& program, const MachineDefinition& machine, std
 
 }  // namespace
 
-void compensate_latency(MachineProgram& program, const MachineDefinition& machine) {
+void compensate_latency(MachineProgram& program, const MachineDefinition& machine, ToolTurn turn) {
   std::vector<Place> places;
   bool any = false;
   for (std::size_t a = 0; a < program.actions.size(); ++a) {
@@ -83,6 +85,9 @@ void compensate_latency(MachineProgram& program, const MachineDefinition& machin
         MachineMove part = whole;
         const JointVector& from = program.moves[i - 1].to;
         part.to = from + place.share * (whole.to - from);
+        if (whole.interpolation == MoveInterpolation::tool)
+          part.tool = tool_motion(program.moves[i - 1].tool, whole.tool, place.share, turn,
+                                  machine.tool.axis);
         part.from_share = whole.from_share + done * (whole.to_share - whole.from_share);
         part.to_share = whole.from_share + place.share * (whole.to_share - whole.from_share);
         part.duration = (place.share - done) * whole.duration;

@@ -12,6 +12,8 @@ namespace smoothpost {
 /// behind a dwell or an event that stops. It never passes such a place.
 /// Guarantees (tests): the split moves end where they did and last as long; an event stands its
 /// latency ahead. Cost: linear in moves and actions.
-void compensate_latency(MachineProgram& program, const MachineDefinition& machine);
+/// `turn`: how the controller turns the tool on tool moves, which carry their start in the tool
+/// pose of the move before.
+void compensate_latency(MachineProgram& program, const MachineDefinition& machine, ToolTurn turn);
 
 }  // namespace smoothpost

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "formats/csv/cutter_locations.h"
+#include "formats/nc/dialect_detection.h"
 #include "formats/nc/parser.h"
 #include "kernels/core/units.h"
 
@@ -200,8 +201,11 @@ class PathBuilder {
   }
 
   void add_motion(const CanonicalMotion& motion) {
-    const AxisMask lacking_start = motion.unknown_start & programmed_;
-    const AxisMask lacking_end = motion.unknown_end & programmed_;
+    // With the tool axis as a vector the rotary bits say whether that is unknown.
+    const AxisMask counts =
+        motion.axis_vector ? static_cast<AxisMask>(programmed_ | kRotary) : programmed_;
+    const AxisMask lacking_start = motion.unknown_start & counts;
+    const AxisMask lacking_end = motion.unknown_end & counts;
     if (motion.kind == MotionKind::feed && lacking_start != 0) {
       fail("NC313", motion.line,
            "a feed motion starts where the position of " + words_text(lacking_start) +
@@ -246,6 +250,7 @@ class PathBuilder {
     // A program that never compensates describes the tip itself; one that does is at the holder's
     // reference until it compensates.
     point.tip_offset = compensates_ ? tool_length_ - compensation_ : 0.0;
+    if (motion.axis_vector) set_location(point, motion.end, motion.end_axis);
     if (motion.is_arc) {
       point.is_arc = true;
       point.arc = static_cast<std::int32_t>(out_.path.arcs.size());
@@ -254,14 +259,31 @@ class PathBuilder {
     return point;
   }
 
+  void set_location(PathPoint& point, const AxisWords& words, const Vec3& axis) const {
+    const Pose part_from_world = out_.frames.world_from_part.inverse();
+    point.interpolation = PathInterpolation::great_circle;
+    point.location.axis = (part_from_world.linear() * axis).normalized();
+    point.location.tip = part_from_world * Vec3(words[0], words[1], words[2]) -
+                         point.tip_offset * point.location.axis;
+  }
+
   // A program whose first motion starts at a known place (an earlier lost motion ended there).
   void add_start_point(const CanonicalMotion& motion, const PathPoint& like) {
     PathPoint start = like;
     start.words = motion.start;
+    if (motion.axis_vector) set_location(start, motion.start, motion.start_axis);
     start.is_arc = false;
     start.arc = -1;
     start.duration = 0.0;
     out_.path.points.push_back(start);
+  }
+
+  // The tip at `words` as the controller reads them for `like`.
+  Vec3 tip_of(const AxisWords& words, const PathPoint& like) const {
+    if (like.interpolation == PathInterpolation::great_circle)
+      return out_.frames.world_from_part.inverse() * Vec3(words[0], words[1], words[2]) -
+             like.tip_offset * like.location.axis;
+    return ReferencePath(out_.path, out_.frames).location_of_words(words, like).tip;
   }
 
   void push(PathPoint point) {
@@ -274,17 +296,14 @@ class PathBuilder {
         // The controller changed its reading of the words here: a rapid across that place is ours
         // to plan; a cut across it would start with a jump of the tip.
         if (point.kind == MotionKind::feed) {
-          PathPoint seen = point;
-          ReferencePath probe(out_.path, out_.frames);
-          seen.words = last.words;
-          const auto before = probe.location_of_words(last.words, last);
-          const auto after = probe.location_of_words(last.words, point);
-          if ((before.tip - after.tip).norm() > 1e-6) {
+          const Vec3 before = tip_of(last.words, last);
+          const Vec3 after = tip_of(last.words, point);
+          if ((before - after).norm() > 1e-6) {
             fail("NC314", point.line,
                  "a feed motion starts right after the tool length or TCP mode changed, where the "
                  "tip "
                  "jumps by " +
-                     std::to_string((before.tip - after.tip).norm()) +
+                     std::to_string((before - after).norm()) +
                      " mm: program a rapid move between them");
             return;
           }
@@ -298,8 +317,12 @@ class PathBuilder {
   void describe() {
     out_.system = first_system_;
     ReferencePath reference(out_.path, out_.frames);
-    for (auto& point : out_.path.points)
-      point.location = reference.location_of_words(point.words, point);
+    for (auto& point : out_.path.points) {
+      if (point.interpolation == PathInterpolation::great_circle)
+        uses_vectors_ = true;
+      else
+        point.location = reference.location_of_words(point.words, point);
+    }
     auto& assumes = out_.assumes;
     if (settings_.machine)
       assumes.push_back("the input was posted for machine " + settings_.machine->name);
@@ -327,8 +350,10 @@ class PathBuilder {
           "outside TCP mode the program's zero lies at the input machine's zero (no "
           "--input-work-offset given)");
     out_.reference =
-        uses_tcp_ && uses_joints_ ? "TCP mode: tip on lines and arcs, rotary joints linear; "
-                                    "outside it all joints linear"
+        uses_vectors_ ? "tool axis by vectors: tip on lines and arcs, tool axis on great circles" +
+                            std::string(uses_joints_ ? "; outside it all joints linear" : "")
+        : uses_tcp_ && uses_joints_ ? "TCP mode: tip on lines and arcs, rotary joints linear; "
+                                      "outside it all joints linear"
         : uses_tcp_ ? "tip on lines and arcs, rotary joints of the input machine linear"
                     : "joints of the input machine linear, arcs in XYZ";
   }
@@ -374,6 +399,7 @@ class PathBuilder {
   std::size_t end_ = static_cast<std::size_t>(-1);
   bool uses_tcp_ = false;
   bool uses_joints_ = false;
+  bool uses_vectors_ = false;
   bool compensates_ = false;
   bool world_set_ = false;
   int first_system_ = 1;
@@ -391,6 +417,7 @@ class PathBuilder {
 nc::InterpreterSettings interpreter_settings(const InputSettings& settings) {
   nc::InterpreterSettings s;
   s.tool_lengths = settings.tool_lengths;
+  s.integer_increment = settings.integer_unit;
   s.work_offsets = settings.work_offsets;
   if (settings.machine) {
     s.axes = 0;
@@ -412,19 +439,83 @@ nc::InterpreterSettings interpreter_settings(const InputSettings& settings) {
 
 }  // namespace
 
+std::string dialect_name(nc::InputDialect dialect) {
+  switch (dialect) {
+    case nc::InputDialect::linuxcnc:
+      return "linuxcnc";
+    case nc::InputDialect::fanuc:
+      return "fanuc";
+    case nc::InputDialect::haas:
+      return "haas";
+    case nc::InputDialect::siemens:
+      return "siemens";
+  }
+  return "linuxcnc";
+}
+
+std::optional<nc::InputDialect> input_dialect(std::string_view name) {
+  for (const auto dialect : {nc::InputDialect::linuxcnc, nc::InputDialect::fanuc,
+                             nc::InputDialect::haas, nc::InputDialect::siemens})
+    if (name == dialect_name(dialect)) return dialect;
+  return {};
+}
+
+namespace {
+
+std::string dialect_list(const std::vector<nc::InputDialect>& dialects) {
+  std::string text;
+  for (const auto dialect : dialects) text += (text.empty() ? "" : ", ") + dialect_name(dialect);
+  return text;
+}
+
+/// The dialect that the user named, or the only one whose marks stand in the text.
+Result<nc::InputDialect> dialect_of(const std::string& text, const InputSettings& settings) {
+  if (settings.dialect) return Result<nc::InputDialect>(*settings.dialect);
+  Diagnostic d;
+  d.where.file = settings.file_name;
+  if (nc::is_heidenhain(text)) {
+    d.code = "US149";
+    d.text =
+        "this is a Heidenhain conversational program (BEGIN PGM), which this version does not "
+        "read";
+    return Result<nc::InputDialect>::failure(d);
+  }
+  const auto fitting = nc::fitting_dialects(text);
+  if (fitting.size() > 1) {
+    d.code = "US149";
+    d.text = "the program has marks of several dialects (" + dialect_list(fitting) +
+             "): say which one it is with --input-dialect";
+    return Result<nc::InputDialect>::failure(d);
+  }
+  if (fitting.empty()) return Result<nc::InputDialect>(nc::InputDialect::linuxcnc);
+  if (fitting.front() == nc::InputDialect::linuxcnc)
+    return Result<nc::InputDialect>(nc::InputDialect::linuxcnc);
+  d.severity = Severity::note;
+  d.code = "NC315";
+  d.text = "read as dialect " + dialect_name(fitting.front()) +
+           ", the only one whose words stand in it (--input-dialect says another)";
+  return Result<nc::InputDialect>(fitting.front(), {d});
+}
+
+}  // namespace
+
 Result<InterpretedInput> interpret_nc(std::string text, const InputSettings& settings) {
-  auto parsed = nc::parse(std::move(text), settings.file_name);
+  const auto dialect = dialect_of(text, settings);
+  if (!dialect.ok()) return Result<InterpretedInput>::failure(dialect.diagnostics());
+  auto parsed = nc::parse(std::move(text), settings.file_name, dialect.value());
   if (has_error(parsed.diagnostics))
     return Result<InterpretedInput>::failure(std::move(parsed.diagnostics));
   Recorder recorder;
   const auto summary = nc::interpret(parsed.program, interpreter_settings(settings), recorder);
-  Diagnostics diagnostics = std::move(parsed.diagnostics);
+  Diagnostics diagnostics = dialect.diagnostics();
+  diagnostics.insert(diagnostics.end(), parsed.diagnostics.begin(), parsed.diagnostics.end());
   diagnostics.insert(diagnostics.end(), summary.diagnostics().begin(), summary.diagnostics().end());
   if (!summary.ok()) return Result<InterpretedInput>::failure(std::move(diagnostics));
   auto built = PathBuilder(recorder, settings).run();
   diagnostics.insert(diagnostics.end(), built.diagnostics().begin(), built.diagnostics().end());
   if (!built.ok()) return Result<InterpretedInput>::failure(std::move(diagnostics));
   built.value().lines = parsed.program.blocks.size();
+  built.value().dialect = dialect_name(dialect.value());
   return Result<InterpretedInput>(std::move(built.value()), std::move(diagnostics));
 }
 

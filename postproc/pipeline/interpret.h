@@ -3,6 +3,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "formats/nc/interpreter.h"
@@ -18,7 +19,14 @@ struct InputSettings {
   std::optional<ProcessTable> process;       ///< in place of the machine's
   std::map<int, double> tool_lengths;        ///< mm, by tool number
   std::map<int, nc::WorkOffset> work_offsets;
+  std::optional<nc::InputDialect> dialect;  ///< nothing: found out when only one fits the text
+  /// fanuc, haas: mm or deg that one unit of a number without point is; nothing: refused
+  std::optional<double> integer_unit;
 };
+
+/// The name of --input-dialect, and the dialect of that name.
+std::string dialect_name(nc::InputDialect dialect);
+std::optional<nc::InputDialect> input_dialect(std::string_view name);
 
 /// The input as a tool path in the part, with the frames that its words were read in.
 struct InterpretedInput {
@@ -26,6 +34,7 @@ struct InterpretedInput {
   ReferencePath::Frames frames;
   std::vector<std::string> assumes;  ///< what the reading took for granted, for the certificate
   std::string reference;             ///< how the input is interpolated, for the certificate
+  std::string dialect;               ///< of NC text: linuxcnc, fanuc ...
   std::size_t lines = 0;
   bool uses_tools = false;  ///< a tool was changed or compensated
   int system = 1;           ///< work system of the first motion, 1..9 for G54..G59.3

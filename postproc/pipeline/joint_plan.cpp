@@ -5,6 +5,8 @@
 
 #include "kernels/core/units.h"
 #include "kernels/kinematics/branch_tracking.h"
+#include "postproc/pipeline/plan_messages.h"
+#include "postproc/pipeline/tool_motion.h"
 
 namespace smoothpost {
 
@@ -37,19 +39,23 @@ class Planner {
     const BranchTracking tracking = track();
     if (tracking.status == BranchTracking::Status::rewind_needed && settings_.may_split)
       return Result<JointPlan>(splits(tracking));
-    if (tracking.status != BranchTracking::Status::ok) return fail(tracking);
+    if (tracking.status != BranchTracking::Status::ok)
+      return Result<JointPlan>::failure(tracking_failure(
+          tracking, reference_.path().points[tracked_[tracking.point].segment].line, settings_));
     for (std::size_t i = 0; i < tracked_.size(); ++i) {
       JointSample to = tracked_[i];
       to.q = tracking.q[i];
       to.branch = tracking.branch[i];
       if (i > 0 && !replanned(to.segment)) {
         const JointSample from = at_start_of(samples_.back(), to.segment);
-        if (!refine(from, to, 0)) return too_steep(to.segment);
+        if (!refine(from, to, 0))
+          return Result<JointPlan>::failure(
+              too_steep(reference_.path().points[to.segment].line, settings_));
       }
       samples_.push_back(std::move(to));
       if (i % 4096 == 0 &&
           !progress_("kinematics", static_cast<double>(i) / static_cast<double>(tracked_.size())))
-        return cancelled();
+        return Result<JointPlan>::failure(plan_cancelled());
     }
     JointPlan plan;
     plan.samples = std::move(samples_);
@@ -157,8 +163,14 @@ class Planner {
 
   // Splits [from, to] until straight joint motion follows the reference; appends the samples
   // between.
-  bool refine(const JointSample& from, const JointSample& to, int depth) {
-    if (follows(from, to)) return true;
+  bool refine(const JointSample& from, JointSample& to, int depth) {
+    if (settings_.tool_moves) {
+      const bool joints_go = tool_takes_joints(from, to);
+      if (joints_go && follows_by_tool(from, to)) return true;
+      if (!joints_go && follows(from, to)) return to.by_joints = true;
+    } else if (follows(from, to)) {
+      return true;
+    }
     if (depth >= kMaxSplits) return false;
     JointSample mid;
     mid.segment = to.segment;
@@ -212,60 +224,61 @@ class Planner {
     return true;
   }
 
-  Diagnostic at_line(const char* code, std::uint32_t line, std::string text) const {
-    Diagnostic d;
-    d.code = code;
-    d.text = std::move(text);
-    d.where = {settings_.file_name, static_cast<int>(line), 0};
-    return d;
-  }
-
-  // Kernels count joints from 1; people know axes by name.
-  std::string named(std::string text) const {
-    for (std::size_t j = settings_.axis_names.size(); j-- > 0;) {
-      const std::string joint = "joint " + std::to_string(j + 1);
-      for (std::size_t at = 0; (at = text.find(joint, at)) != std::string::npos;)
-        text.replace(at, joint.size(), "axis " + settings_.axis_names[j]);
+  // Whether the joints come from the one end to the other without a jump when the tool leads them.
+  bool tool_takes_joints(const JointSample& from, const JointSample& to) const {
+    constexpr int kSteps = 8;
+    constexpr double kUneven = 2.5;  // times the mean step
+    constexpr double kAtOnce = 0.02 * kRadiansPerDegree;
+    double whole = 0.0;
+    for (const int j : {pair_.first_rotary(), pair_.second_rotary()})
+      whole = std::max(whole, std::abs(to.q[j] - from.q[j]));
+    const double largest = std::max(kUneven * whole / kSteps, kAtOnce);
+    const double tool_length = reference_.path().points[to.segment].tool_length;
+    const CutterLocation a = tip_at(from.q, tool_length);
+    const CutterLocation b = tip_at(to.q, tool_length);
+    JointVector q = from.q;
+    for (int k = 1; k <= kSteps; ++k) {
+      const double t = static_cast<double>(k) / kSteps;
+      const CutterLocation at{a.tip + t * (b.tip - a.tip), great_circle(a.axis, b.axis, t)};
+      const RotaryPairSolutions solutions = pair_.solve(holder_location(at, tool_length), q);
+      double best = INFINITY;
+      JointVector next = q;
+      for (std::size_t branch = 0; branch < 2; ++branch) {
+        if (!solutions.valid[branch]) continue;
+        JointVector candidate = solutions.q[branch];
+        double step = 0.0;
+        for (const int j : {pair_.first_rotary(), pair_.second_rotary()}) {
+          candidate[j] = nearest_turn(candidate[j], q[j]);
+          step = std::max(step, std::abs(candidate[j] - q[j]));
+        }
+        if (step >= best) continue;
+        best = step;
+        next = candidate;
+      }
+      if (best > largest) return false;
+      q = next;
     }
-    return text;
+    return (q - to.q).lpNorm<Eigen::Infinity>() < 1e-6;
   }
 
-  Result<JointPlan> fail(const BranchTracking& tracking) const {
-    Diagnostics out;
-    const std::uint32_t line = reference_.path().points[tracked_[tracking.point].segment].line;
-    switch (tracking.status) {
-      case BranchTracking::Status::unreachable:
-        out.push_back(
-            at_line("KN101", line,
-                    "the tool axis cannot be reached by this machine: " + named(tracking.reason)));
-        break;
-      case BranchTracking::Status::over_limit:
-        out.push_back(
-            at_line("KN102", line,
-                    "no position of the machine within its limits: " + named(tracking.reason) +
-                        ". Place the part elsewhere with --work-offset or choose another machine"));
-        break;
-      default:
-        for (const auto& rewind : tracking.rewinds)
-          out.push_back(
-              at_line("KN103", rewind.line,
-                      "the cut cannot go on without a rewind here: " + named(rewind.reason) +
-                          ". Split the cut before this line, set links.rewind = \"in_cut\", or choose a "
-                      "machine with more range"));
-        if (out.empty())
-          out.push_back(at_line("KN103", line, "a rewind is needed: " + named(tracking.reason)));
-        break;
+  // The controller keeps the tip straight and takes the axis along the great circle.
+  bool follows_by_tool(const JointSample& from, const JointSample& to) const {
+    const double tool_length = reference_.path().points[to.segment].tool_length;
+    const CutterLocation a = tip_at(from.q, tool_length);
+    const CutterLocation b = tip_at(to.q, tool_length);
+    for (const double t : {0.25, 0.5, 0.75}) {
+      const CutterLocation wanted = reference_.at(to.segment, from.s + t * (to.s - from.s));
+      const Vec3 tip = a.tip + t * (b.tip - a.tip);
+      if ((tip - wanted.tip).norm() > 0.8 * settings_.tip_tolerance) return false;
+      if ((great_circle(a.axis, b.axis, t) - wanted.axis).norm() > 0.8 * settings_.axis_tolerance)
+        return false;
     }
-    return Result<JointPlan>::failure(std::move(out));
+    return true;
   }
 
-  Result<JointPlan> too_steep(std::size_t segment) const {
-    return Result<JointPlan>::failure(
-        at_line("KN104", reference_.path().points[segment].line,
-                "the machine cannot follow this motion inside the tolerances: a rotary would have "
-                "to jump (the "
-                "tool axis passes the machine's pole). Widen --axis-tolerance or change the tool "
-                "axis there"));
+  CutterLocation tip_at(const JointVector& q, double tool_length) const {
+    const CutterLocation holder = forward_location(pair_.chain(), q);
+    return {holder.tip - tool_length * holder.axis, holder.axis};
   }
 
   // The last place that can be reached before each dead end.
@@ -276,13 +289,6 @@ class Planner {
       plan.splits.push_back({before.segment, before.s});
     }
     return plan;
-  }
-
-  static Result<JointPlan> cancelled() {
-    Diagnostic d;
-    d.code = "US190";
-    d.text = "cancelled";
-    return Result<JointPlan>::failure(d);
   }
 
   const ReferencePath& reference_;
@@ -303,8 +309,7 @@ CutterLocation holder_location(const CutterLocation& tip, double tool_length) {
 }
 
 Result<JointPlan> plan_joints(const ReferencePath& reference, const RotaryPair& pair,
-                                             const JointPlanSettings& settings,
-                                             const Progress& progress) {
+                              const JointPlanSettings& settings, const Progress& progress) {
   return Planner(reference, pair, settings, progress).run();
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,8 @@ struct JointPlanSettings {
   JointVector held;             ///< redundant joints' values; also where the joints start from
   std::string file_name;        ///< for messages
   std::vector<std::string> axis_names;  ///< for messages, in joint order
+  bool tool_moves = false;              ///< the controller interpolates tip and axis, not joints
+  std::optional<double> spin;           ///< rad, arms: the rotation about the tool axis (plan_arm)
   bool may_split = false;               ///< a cut may be split where a rotary has to be unwound
 };
 
@@ -27,6 +30,7 @@ struct JointSample {
   double s = 1.0;
   int branch = 0;
   JointVector q;
+  bool by_joints = false;  ///< with tool moves: the way here is straight in the joints all the same
 };
 
 /// A place inside a cut that has no continuous way on: the cut has to be split there.
@@ -43,10 +47,13 @@ struct JointPlan {
 /// Joint values along the whole reference path, close enough that straight joint motion from each
 /// sample to the next stays inside the tolerances (checked at quarter points; the certificate
 /// bounds it). One global choice of branch and winding; the last sample of every segment is at s
-/// = 1. Of a run of replanned segments only its end has a sample: where the next run starts. `pair` is the output machine's chain with tool length 0 and the part placed in it.
-/// Failures: KN101 unreachable, KN102 limits, KN103 rewind needed (input lines named; with
-/// settings.may_split the places are in JointPlan::splits instead), KN104 a motion that cannot be
-/// followed inside the tolerances. Cost: linear in the samples.
+/// = 1. With settings.tool_moves a step whose joints would jump on the tool's own way (over the
+/// pole, where the first rotary has to turn while the tool axis stands) goes straight in the
+/// joints. Of a run of replanned segments only its end has a sample: where the next run starts.
+/// `pair` is the output machine's chain with tool length 0 and the part placed in it. Failures:
+/// KN101 unreachable, KN102 limits, KN103 rewind needed (input lines named; with settings.may_split
+/// the places are in JointPlan::splits instead), KN104 a motion that cannot be followed inside the
+/// tolerances. Cost: linear in the samples.
 Result<JointPlan> plan_joints(const ReferencePath& reference, const RotaryPair& pair,
                               const JointPlanSettings& settings, const Progress& progress);
 

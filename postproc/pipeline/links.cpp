@@ -8,6 +8,11 @@ namespace smoothpost {
 
 namespace {
 
+constexpr double kArmLook = 5.0;       // mm, between the places where a straight way is looked at
+constexpr double kArmStep = 0.25;      // rad, of a joint from one to the next
+constexpr double kArmJointStep = 5.0;  // mm, between joint moves that stand for a straight one
+constexpr double kArmStraight = 0.05;  // mm, that those may leave the line by
+constexpr int kMostHalvings = 14;
 constexpr double kStraightShare = 0.5;  // of the velocity limits, on feeds along the tool axis
 
 /// Largest value of v·n over the box.
@@ -23,6 +28,49 @@ double farthest(const PartBox& box, const Vec3& p) {
     d[i] = std::max(std::abs(box.lower[i] - p[i]), std::abs(box.upper[i] - p[i]));
   return d.norm();
 }
+
+/// A straight way of an arm's tip in joint moves.
+struct StraightSteps {
+  struct At {
+    double share;
+    JointVector q;
+  };
+  const Inverse& arm;
+  Pose start;
+  Vec3 way;
+  double tool_length;
+
+  /// Appends the joints behind `from` up to `to`.
+  void add(const At& from, const At& to, int depth, std::vector<JointVector>& joints) const {
+    const bool is_short = (to.share - from.share) * way.norm() <= kArmJointStep;
+    std::optional<JointVector> middle;
+    const double share = 0.5 * (from.share + to.share);
+    if (depth < kMostHalvings && !(is_short && is_straight(from, to)))
+      middle = arm.nearest(at(share), 0.5 * (from.q + to.q));
+    if (!middle) {
+      joints.push_back(to.q);
+      return;
+    }
+    add(from, {share, *middle}, depth + 1, joints);
+    add({share, *middle}, to, depth + 1, joints);
+  }
+
+ private:
+  Pose at(double share) const {
+    Pose pose = start;
+    pose.translation() += share * way;
+    return pose;
+  }
+
+  bool is_straight(const At& from, const At& to) const {
+    const Pose got = forward(arm.chain(), 0.5 * (from.q + to.q));
+    const Pose wanted = at(0.5 * (from.share + to.share));
+    const Vec3& axis = arm.chain().tool_axis;
+    const Vec3 turn = got.linear() * axis - wanted.linear() * axis;
+    return (got.translation() - wanted.translation()).norm() + tool_length * turn.norm() <=
+           kArmStraight;
+  }
+};
 
 CutterLocation tip_of(const ScrewChain& chain, const LinkEnd& end) {
   CutterLocation location = forward_location(chain, end.q);
@@ -67,6 +115,8 @@ LinkPlanner::LinkPlanner(const MachineDefinition& machine, const ScrewChain& cha
     const bool rotary = machine.axes[static_cast<std::size_t>(j)].joint.kind == JointKind::rotary;
     (rotary ? rotary_ : linear_) |= 1U << j;
   }
+  auto inverse = Inverse::from(chain);
+  if (inverse && inverse->takes_rotation()) arm_ = std::move(inverse);
 }
 
 MachineMove LinkPlanner::move(JointMask joints, const JointVector& to) const {
@@ -91,8 +141,9 @@ void LinkPlanner::add_straight(std::vector<MachineMove>& moves, const JointVecto
     straight.duration = machine_.cycle.min_block;
     for (int j = 0; j < machine_.size(); ++j)
       straight.duration =
-          std::max(straight.duration, std::abs(to[j] - from[j]) /
-                                          (kStraightShare * machine_.axes[static_cast<std::size_t>(j)].velocity));
+          std::max(straight.duration,
+                   std::abs(to[j] - from[j]) /
+                       (kStraightShare * machine_.axes[static_cast<std::size_t>(j)].velocity));
   }
   moves.push_back(std::move(straight));
 }
@@ -120,6 +171,11 @@ std::optional<JointVector> LinkPlanner::along_tool(const JointVector& q, double 
   return clear;
 }
 
+bool LinkPlanner::is_cramped(const JointVector& q, const JointVector& clear) const {
+  const double way = (forward_location(chain_, clear).tip - forward_location(chain_, q).tip).norm();
+  return way < machine_.links.clearance - 1e-6;
+}
+
 // Without room for the whole clearance the tool leaves as far as it can.
 JointVector LinkPlanner::clear_of(const JointVector& q) const {
   for (double share = 1.0; share > 0.1; share *= 0.5)
@@ -130,6 +186,7 @@ JointVector LinkPlanner::clear_of(const JointVector& q) const {
 Link LinkPlanner::over_plane(const LinkEnd& to) const {
   Link link;
   const JointVector above = clear_of(to.q);
+  link.cramped = is_cramped(to.q, above);
   if (retract_axis_ >= 0) {
     JointVector up = above;
     up[retract_axis_] = retract_;
@@ -146,11 +203,24 @@ Link LinkPlanner::over_plane(const LinkEnd& to) const {
   return link;
 }
 
-Link LinkPlanner::first(const LinkEnd& to) const { return over_plane(to); }
+Link LinkPlanner::first(const LinkEnd& to) const {
+  if (!arm_) return over_plane(to);
+  Link link = arm_approach(to);
+  link.approach.insert(link.approach.begin(), move(rotary_ | linear_, home_of(machine_)));
+  link.retracted = 1;
+  return link;
+}
 
 Link LinkPlanner::last(const LinkEnd& from) const {
   Link link;
+  if (arm_) {
+    link.cramped = is_cramped(from.q, arm_clear_of(from));
+    link.away = arm_away(from);
+    add(link.away, rotary_ | linear_, home_of(machine_));
+    return link;
+  }
   const JointVector above = clear_of(from.q);
+  link.cramped = is_cramped(from.q, above);
   if ((above - from.q).norm() > 0.0) add_straight(link.away, from.q, above);
   JointVector home = home_of(machine_);
   JointVector up = above;
@@ -168,10 +238,17 @@ Link LinkPlanner::last(const LinkEnd& from) const {
 }
 
 Link LinkPlanner::between(const LinkEnd& from, const LinkEnd& to, bool must_retract) const {
+  if (arm_) {
+    Link link = arm_approach(to);
+    link.cramped = link.cramped || is_cramped(from.q, arm_clear_of(from));
+    link.away = arm_away(from);
+    return link;
+  }
   if (!must_retract)
     if (auto link = low(from, to)) return std::move(*link);
   Link link = over_plane(to);
   const JointVector above = clear_of(from.q);
+  link.cramped = link.cramped || is_cramped(from.q, above);
   if ((above - from.q).norm() > 0.0) add_straight(link.away, from.q, above);
   return link;
 }
@@ -181,8 +258,8 @@ double LinkPlanner::needed_distance(const LinkEnd& at, const Vec3& axis, const V
   const Vec3 tip = tip_of(chain_, at).tip;
   double distance = machine_.links.clearance;
   for (const Vec3& n : {axis, other})
-    distance = std::max(
-        distance, (support(*part_, n) + machine_.links.clearance - tip.dot(n)) / axis.dot(n));
+    distance = std::max(distance,
+                        (support(*part_, n) + machine_.links.clearance - tip.dot(n)) / axis.dot(n));
   return distance;
 }
 
@@ -216,9 +293,7 @@ std::optional<Link> LinkPlanner::low(const LinkEnd& from, const LinkEnd& to) con
   Link link;
   link.low = true;
   add_straight(link.away, from.q, *away);
-  add(link.approach, retract_bit(), up);
-  link.approach.back().machine_coordinates = true;
-  link.retracted = link.approach.size();
+  add(link.away, retract_bit(), up);
   std::vector<LinkEnd> waypoints{{*away, from.tool_length}, {up, from.tool_length}};
   const auto step = [&](JointMask joints, const JointVector& q) {
     add(link.approach, joints, q);
@@ -243,6 +318,80 @@ std::optional<Link> LinkPlanner::low(const LinkEnd& from, const LinkEnd& to) con
   if (!(proven_height(chain_, waypoints, *part_) >= 0.5 * machine_.links.clearance)) return {};
   add_straight(link.approach, *above, to.q);
   return link;
+}
+
+// Followed from place to place, as a controller does it: where the arm passes near a singular
+// posture, its axes would turn far on a short way, and there is no straight way.
+std::optional<JointVector> LinkPlanner::moved_tip(const LinkEnd& at, const Vec3& step) const {
+  const Pose start = forward(chain_, at.q);
+  const int steps = std::max(1, static_cast<int>(std::ceil(step.norm() / kArmLook)));
+  JointVector q = at.q;
+  for (int k = 1; k <= steps; ++k) {
+    Pose pose = start;
+    pose.translation() += step * k / steps;
+    const auto next = arm_->nearest(pose, q);
+    if (!next || (*next - q).lpNorm<Eigen::Infinity>() > kArmStep) return {};
+    q = *next;
+    for (int j = 0; j < machine_.size(); ++j) {
+      const auto& joint = chain_.joints[static_cast<std::size_t>(j)];
+      if (q[j] < joint.lower || q[j] > joint.upper) return {};
+    }
+  }
+  return q;
+}
+
+JointVector LinkPlanner::arm_clear_of(const LinkEnd& at) const {
+  const Vec3 axis = forward_location(chain_, at.q).axis;
+  for (double share = 1.0; share > 0.1; share *= 0.5)
+    if (const auto q = moved_tip(at, share * machine_.links.clearance * axis)) return *q;
+  return at.q;
+}
+
+// Straight up to the retract plane, as far as the arm reaches.
+JointVector LinkPlanner::arm_above(const LinkEnd& at) const {
+  if (!machine_.links.has_plane) return at.q;
+  const Vec3 up = chain_.workpiece_home.linear().transpose() * Vec3::UnitZ();
+  const double height = (chain_.workpiece_home * tip_of(chain_, at).tip).z();
+  const double rise = machine_.links.retract - height;
+  if (rise <= 0.0) return at.q;
+  for (double share = 1.0; share > 0.1; share *= 0.75)
+    if (const auto q = moved_tip(at, share * rise * up)) return *q;
+  return at.q;
+}
+
+void LinkPlanner::add_arm_straight(std::vector<MachineMove>& moves, const LinkEnd& from,
+                                   const JointVector& to) const {
+  if ((to - from.q).norm() == 0.0) return;
+  if (machine_.dialect.mode == "tcp") {
+    moves.push_back(move(0, to));
+    moves.back().interpolation = MoveInterpolation::tool;
+    return;
+  }
+  const StraightSteps steps{
+      *arm_, forward(chain_, from.q),
+      forward(chain_, to).translation() - forward(chain_, from.q).translation(), from.tool_length};
+  std::vector<JointVector> joints;
+  steps.add({0.0, from.q}, {1.0, to}, 0, joints);
+  for (const JointVector& q : joints) moves.push_back(move(rotary_ | linear_, q));
+}
+
+Link LinkPlanner::arm_approach(const LinkEnd& to) const {
+  Link link;
+  const JointVector clear = arm_clear_of(to);
+  link.cramped = is_cramped(to.q, clear);
+  const JointVector above = arm_above({clear, to.tool_length});
+  add(link.approach, rotary_ | linear_, above);
+  add_arm_straight(link.approach, {above, to.tool_length}, clear);
+  add_arm_straight(link.approach, {clear, to.tool_length}, to.q);
+  return link;
+}
+
+std::vector<MachineMove> LinkPlanner::arm_away(const LinkEnd& from) const {
+  std::vector<MachineMove> moves;
+  const JointVector clear = arm_clear_of(from);
+  add_arm_straight(moves, from, clear);
+  add_arm_straight(moves, {clear, from.tool_length}, arm_above({clear, from.tool_length}));
+  return moves;
 }
 
 }  // namespace smoothpost

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "kernels/kinematics/inverse.h"
 #include "kernels/kinematics/screw_chain.h"
 #include "machines/definition/machine.h"
 #include "machines/dialects/dialect.h"
@@ -24,11 +25,14 @@ struct LinkEnd {
   double tool_length = 0.0;  ///< mm
 };
 
-/// The moves of one link, in order. `approach` stands alone: it can be run from a retracted machine.
+/// The moves of one link, in order. `approach` stands alone: it can be run from a retracted
+/// machine, whose retract axis (of an arm: whose tip) is at its retract place or, behind `away`, as
+/// high.
 struct Link {
   std::vector<MachineMove> away;
   std::vector<MachineMove> approach;
-  bool low = false;  ///< passes the part at its clearance height, not over the retract plane
+  bool low = false;      ///< passes the part at its clearance height, not over the retract plane
+  bool cramped = false;  ///< an end had no room for the whole clearance along the tool axis
   std::size_t retracted = 0;  ///< moves of `approach` up to where tools may be changed
 };
 
@@ -42,14 +46,21 @@ struct Link {
 double proven_height(const ScrewChain& chain, const std::vector<LinkEnd>& waypoints,
                      const PartBox& part);
 
-/// Plans links for machines with two rotaries and three linear axes.
-///  - away: along the tool axis by links.clearance (or as far as there is room);
+/// Plans links. For machines with two rotaries and three linear axes:
+///  - away: along the tool axis by links.clearance (or as far as there is room: `cramped`);
 ///  - over the part: the retract axis alone to its retract position; rotaries; the other linears;
-///  - approach: the retract axis down to a point on the tool axis above the end; along the tool axis.
-/// A link is low when the tool turns by no more than links.rotation, the part is known and
-/// proven_height() of the whole traverse is at least half the clearance: then it goes only as high
-/// as that needs. With links.rapid = independent a low link moves its axes one after the other, and
-/// moves along the tool axis are feeds: a rapid would leave the line.
+///  - approach: the retract axis down to a point on the tool axis above the end; along the tool
+///  axis.
+/// A link is low when neither the tool axis nor a rotary turns by more than links.rotation, the
+/// tool is the same, the part is known and proven_height() of the whole traverse is at least half
+/// the clearance: then it goes only as high as that needs, the retract axis last in `away`. With
+/// links.rapid = independent a low link moves its axes one after the other, and moves along the
+/// tool axis are feeds: a rapid would leave the line.
+///
+/// For six-axis arms: straight along the tool axis, straight up to the retract plane
+/// (links.retract_mm, in M, when there is one), joints to the same place above the end, straight
+/// down, straight along the tool axis. Straight moves are tool moves where the dialect has them,
+/// otherwise short joint moves.
 class LinkPlanner {
  public:
   /// `chain`: output machine, tool length 0, part placed. `retract`: position of the retract axis
@@ -69,8 +80,17 @@ class LinkPlanner {
   void add_straight(std::vector<MachineMove>& moves, const JointVector& from,
                     const JointVector& to) const;
   /// The joints with the tip `distance` further out along the tool axis; nothing outside limits.
+  /// Arms: the joints with the tip moved by `step` (W), at the nearest solution inside the limits.
+  std::optional<JointVector> moved_tip(const LinkEnd& at, const Vec3& step) const;
+  JointVector arm_clear_of(const LinkEnd& at) const;
+  JointVector arm_above(const LinkEnd& at) const;
+  void add_arm_straight(std::vector<MachineMove>& moves, const LinkEnd& from,
+                        const JointVector& to) const;
+  Link arm_approach(const LinkEnd& to) const;
+  std::vector<MachineMove> arm_away(const LinkEnd& from) const;
   std::optional<JointVector> along_tool(const JointVector& q, double distance) const;
   JointVector clear_of(const JointVector& q) const;
+  bool is_cramped(const JointVector& q, const JointVector& clear) const;
   Link over_plane(const LinkEnd& to) const;
   std::optional<Link> low(const LinkEnd& from, const LinkEnd& to) const;
   double needed_distance(const LinkEnd& at, const Vec3& axis, const Vec3& other) const;
@@ -81,6 +101,7 @@ class LinkPlanner {
   std::optional<PartBox> part_;
   int retract_axis_ = -1;
   double retract_ = 0.0;
+  std::optional<Inverse> arm_;
   JointMask rotary_ = 0;
   JointMask linear_ = 0;
 };

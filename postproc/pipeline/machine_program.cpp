@@ -7,6 +7,7 @@
 #include "kernels/core/process.h"
 #include "kernels/core/units.h"
 #include "postproc/pipeline/event_latency.h"
+#include "postproc/pipeline/tool_motion.h"
 
 namespace smoothpost {
 
@@ -34,11 +35,14 @@ class Builder {
         machine_(input.machine),
         samples_(samples),
         links_(input.machine, input.chain, retract_beyond(input.machine, samples), input.part) {
-    all_ = (1U << machine_.size()) - 1U;
+    for (int j = 0; j < machine_.size(); ++j) {
+      all_ |= 1U << j;
+      if (machine_.axes[static_cast<std::size_t>(j)].joint.redundant) redundant_ |= 1U << j;
+    }
     out_.moves.reserve(samples.size() + 16);
   }
 
-  MachineProgram run() {
+  BuiltProgram run() {
     std::size_t end = 0;  // sample behind the last run
     while (end < samples_.size()) {
       const std::size_t begin = end++;
@@ -46,10 +50,11 @@ class Builder {
       run_of(begin, end);
     }
     const Link home = links_.last(link_end(samples_.size() - 1));
-    append(home.away);
+    if (home.cramped) cramped_.push_back(in_.path.points.back().line);
+    append(home.away, link_end(samples_.size() - 1).tool_length);
     emit_until(in_.path.points.size());
-    compensate_latency(out_, machine_);
-    return std::move(out_);
+    compensate_latency(out_, machine_, in_.turn);
+    return {std::move(out_), std::move(cramped_)};
   }
 
  private:
@@ -61,13 +66,15 @@ class Builder {
       link = links_.first(link_end(begin));
     } else {
       link = links_.between(link_end(begin - 1), link_end(begin), changes_tool(start_point));
-      append(link.away);
+      append(link.away, link_end(begin - 1).tool_length);
     }
+    if (link.cramped) cramped_.push_back(in_.path.points[start_point].line);
+    const double tool_length = link_end(begin).tool_length;
     if (end > begin + 1) label(samples_[begin + 1].segment);
-    append(link.approach, 0, link.retracted);
+    append(link.approach, tool_length, 0, link.retracted);
     restate(start_point);
     emit_until(start_point);
-    append(link.approach, link.retracted, link.approach.size());
+    append(link.approach, tool_length, link.retracted);
     emit_at(start_point, true);
     for (std::size_t i = begin + 1; i < end; ++i) {
       const PathPoint& point = in_.path.points[samples_[i].segment];
@@ -80,9 +87,15 @@ class Builder {
     return {samples_[sample].q, in_.path.points[samples_[sample].segment].tool_length};
   }
 
-  void append(const std::vector<MachineMove>& moves, std::size_t from = 0,
+  void append(const std::vector<MachineMove>& moves, double tool_length, std::size_t from = 0,
               std::size_t to = static_cast<std::size_t>(-1)) {
-    for (std::size_t i = from; i < std::min(to, moves.size()); ++i) out_.moves.push_back(moves[i]);
+    for (std::size_t i = from; i < std::min(to, moves.size()); ++i) push(moves[i], tool_length);
+  }
+
+  void push(MachineMove move, double tool_length) {
+    move.tool_length = tool_length;
+    if (in_.turn != ToolTurn::none) move.tool = tip_pose(in_.chain, move.to, tool_length);
+    out_.moves.push_back(std::move(move));
   }
 
   void label(std::uint32_t segment) {
@@ -99,8 +112,13 @@ class Builder {
     } else {
       action.text = "PATH";
     }
-    action.text += " from input line " + std::to_string(action.input_line);
+    action.text += " from input line " + std::to_string(action.input_line) + tool_text(segment);
     out_.actions.push_back(std::move(action));
+  }
+
+  std::string tool_text(std::uint32_t segment) const {
+    const std::int32_t tool = in_.path.points[segment].tool;
+    return tool > 0 ? " with tool " + std::to_string(tool) : "";
   }
 
   bool is_tool_change(const PathEvent& e) const {
@@ -171,23 +189,49 @@ class Builder {
     const JointSample& to = samples_[i];
     MachineMove move;
     move.to = to.q;
-    move.joints = all_;
+    const bool by_tool = in_.turn != ToolTurn::none && !to.by_joints;
+    move.joints = by_tool ? redundant_ : all_;
+    if (by_tool) move.interpolation = MoveInterpolation::tool;
     move.rapid = point.kind == MotionKind::rapid && machine_.links.rapid == RapidMotion::linear;
     move.role = MoveRole::path;
     move.input_line = point.line;
     move.segment = to.segment;
     move.from_share = samples_[i - 1].segment == to.segment ? samples_[i - 1].s : 0.0;
     move.to_share = to.s;
-    if (!move.rapid) move.duration = block_time(samples_[i - 1].q, move, point);
-    out_.moves.push_back(std::move(move));
+    if (!move.rapid)
+      move.duration = block_time(by_tool ? tool_travel(samples_[i - 1].q, move, point.tool_length)
+                                         : JointVector((move.to - samples_[i - 1].q).cwiseAbs()),
+                                 move, point);
+    push(std::move(move), point.tool_length);
   }
 
-  double block_time(const JointVector& from, const MachineMove& move,
+  // The fastest that each joint goes on a tool move, as the way that it would go at that rate.
+  JointVector tool_travel(const JointVector& from, const MachineMove& move,
+                          double tool_length) const {
+    constexpr int kSteps = 8;
+    constexpr double kBetween = 1.1;  // between the steps it may be a little faster
+    const Pose start = tip_pose(in_.chain, from, tool_length);
+    const Pose end = tip_pose(in_.chain, move.to, tool_length);
+    JointVector travel = (move.to - from).cwiseAbs();
+    JointVector last = from;
+    for (int k = 1; k <= kSteps; ++k) {
+      const Pose at =
+          tool_motion(start, end, static_cast<double>(k) / kSteps, in_.turn, in_.chain.tool_axis);
+      const auto q = in_.inverse->nearest(holder_pose(in_.chain, at, tool_length), last);
+      if (!q) return travel;
+      travel = travel.cwiseMax(kSteps * kBetween * (*q - last).cwiseAbs());
+      last = *q;
+    }
+    return travel;
+  }
+
+  // `travel`: of each joint, absolute.
+  double block_time(const JointVector& travel, const MachineMove& move,
                     const PathPoint& point) const {
     double time = point.duration * (move.to_share - move.from_share);
     for (int j = 0; j < machine_.size(); ++j) {
       const auto& axis = machine_.axes[static_cast<std::size_t>(j)];
-      const double step = std::abs(move.to[j] - from[j]);
+      const double step = travel[j];
       const double share = machine_.tolerance.limit_share *
                            (axis.source == LimitSource::assumed ? kAssumedShare : 1.0);
       time = std::max(time, step / (axis.velocity * share));
@@ -204,14 +248,16 @@ class Builder {
   const std::vector<JointSample>& samples_;
   LinkPlanner links_;
   JointMask all_ = 0;
+  JointMask redundant_ = 0;
   std::size_t next_event_ = 0;
   std::map<std::string, PathEvent> states_;
+  std::vector<std::uint32_t> cramped_;
   MachineProgram out_;
 };
 
 }  // namespace
 
-MachineProgram build_program(const ProgramInput& input, const std::vector<JointSample>& samples) {
+BuiltProgram build_program(const ProgramInput& input, const std::vector<JointSample>& samples) {
   return Builder(input, samples).run();
 }
 

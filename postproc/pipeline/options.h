@@ -23,6 +23,7 @@ struct Options {
   std::string dialect;
   std::string input_format;
   std::string input_dialect;
+  std::string integer_unit;  ///< fanuc, haas: 1 | 0.001, mm or deg of a number without point
   std::string input_machine;
   std::string process;
   std::vector<std::string> work_offset;        ///< G54=x,y,z[,a,b,c]: on the output machine

@@ -34,10 +34,11 @@ struct PathMatch {
 /// j−1))) is kept for the pairs with d ≤ 1 − allowance, a band whose width does not grow with the
 /// program. A coupling of samples bounds the distance of the polylines through them; the allowance
 /// covers what the curves leave the polylines (h²/8 times the bound of the second derivative). The
-/// program may have rapids (with settings.beam also feeds without beam) that the input does not have:
-/// before it, after it, and where the input's own way is replanned. A feed move that matches nothing, a dropped or a doubled block end the
-/// matching. `chain` is the program's machine with tool length 0 and the part placed. Cost: linear
-/// in the path length over the tolerance; memory: the band and the samples of one segment run.
+/// program may have rapids (with settings.beam also feeds without beam) that the input does not
+/// have: before it, after it, and where the input's own way is replanned. A feed move that matches
+/// nothing, a dropped or a doubled block end the matching. `chain` is the program's machine with
+/// tool length 0 and the part placed. Cost: linear in the path length over the tolerance; memory:
+/// the band and the samples of one segment run.
 PathMatch match_paths(const ReadBack& program, const ScrewChain& chain, const ReferencePath& input,
                       const PathMatchSettings& settings, const Progress& progress);
 

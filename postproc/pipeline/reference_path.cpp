@@ -83,9 +83,12 @@ CutterLocation ReferencePath::at(std::size_t segment, double s) const {
   require(segment >= 1 && segment <= segments(), "segment of the path");
   const PathPoint& from = path_.points[segment - 1];
   const PathPoint& to = path_.points[segment];
-  if (to.interpolation == PathInterpolation::great_circle)
-    return {from.location.tip + s * (to.location.tip - from.location.tip),
-            great_circle(from.location.axis, to.location.axis, s)};
+  if (to.interpolation == PathInterpolation::great_circle) {
+    const Vec3 axis = great_circle(from.location.axis, to.location.axis, s);
+    if (to.is_arc)
+      return {part_from_world_ * xyz(words_at(segment, s)) - to.tip_offset * axis, axis};
+    return {from.location.tip + s * (to.location.tip - from.location.tip), axis};
+  }
   return location_of_words(words_at(segment, s), to);
 }
 
@@ -96,7 +99,7 @@ SecondDerivativeBound ReferencePath::second_derivative_bound(std::size_t segment
   if (to.interpolation == PathInterpolation::great_circle) {
     const double angle = angle_between(from.location.axis, to.location.axis);
     bound.axis = angle * angle;
-    return bound;
+    if (!to.is_arc) return bound;
   }
   double arc_second = 0.0;
   double arc_speed = 0.0;
@@ -111,6 +114,10 @@ SecondDerivativeBound ReferencePath::second_derivative_bound(std::size_t segment
                  2.0 * std::abs(end_radius - radius) * std::abs(arc.sweep);
     arc_speed = std::max(radius, end_radius) * std::abs(arc.sweep) + std::abs(end_radius - radius) +
                 std::abs(arc.normal.dot(xyz(to.words) - xyz(from.words)));
+  }
+  if (to.interpolation == PathInterpolation::great_circle) {
+    bound.tip = arc_second + std::abs(to.tip_offset) * bound.axis;
+    return bound;
   }
   const double turn = rotary_turn(from.words, to.words);
   bound.axis = chain_ ? turn * turn : 0.0;

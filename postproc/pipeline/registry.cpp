@@ -4,7 +4,9 @@
 #include <array>
 #include <string>
 
+#include "machines/dialects/krl.h"
 #include "machines/dialects/linuxcnc.h"
+#include "machines/dialects/siemens_840d.h"
 
 namespace smoothpost {
 
@@ -20,7 +22,11 @@ constexpr std::array<InputFormat, 2> kFormats = {{
 
 std::span<const InputFormat> input_formats() { return kFormats; }
 
-std::span<const Dialect> dialects() { return {&linuxcnc::kDialect, 1}; }
+std::span<const Dialect> dialects() {
+  static const std::array<Dialect, 3> rows = {krl::kDialect, linuxcnc::kDialect,
+                                              siemens_840d::kDialect};
+  return rows;
+}
 
 const InputFormat* find_input_format(std::string_view name) {
   for (const auto& row : kFormats)

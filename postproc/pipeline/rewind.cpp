@@ -115,7 +115,7 @@ class Splitter {
   void insert(Cut& cut, const SplitPlace& place, std::vector<PathPoint> inserted) {
     const std::size_t k = place.segment;
     const bool whole = place.s > kWhole;
-    const std::size_t stop = k;                     // point where the first half ends
+    const std::size_t stop = k;                       // point where the first half ends
     const std::size_t again = whole ? k + 1 : k + 1;  // point where the second half starts
     // The last inserted point is the old point k; with a whole segment the old one stays in front.
     const std::size_t added = whole ? inserted.size() : inserted.size() - 1;
@@ -124,6 +124,8 @@ class Splitter {
       if (e.point == cut.last && ends_cycle(e)) ending.push_back(e);
       if (e.point + 1 == cut.first && !e.before_start && starts_cycle(e)) starting.push_back(e);
     }
+    for (PathEvent& e : starting) e.event = state_at(cut, k, e.event);
+    if (!path_.points[k].beam) drop_beam_on(starting);
     if (!whole) path_.points.erase(path_.points.begin() + static_cast<std::ptrdiff_t>(k));
     path_.points.insert(path_.points.begin() + static_cast<std::ptrdiff_t>(whole ? k + 1 : k),
                         inserted.begin(), inserted.end());
@@ -140,6 +142,31 @@ class Splitter {
     std::stable_sort(path_.events.begin(), path_.events.end(),
                      [](const PathEvent& a, const PathEvent& b) { return a.point < b.point; });
     shift_cuts(cut, stop, again, added);
+  }
+
+  /// In a micro-joint the second half starts without beam; it comes on where the input has it.
+  static void drop_beam_on(std::vector<PathEvent>& starting) {
+    const auto is = [](const PathEvent& e, const char* name) {
+      return e.kind == PathEvent::Kind::process && e.event.name == name;
+    };
+    if (std::none_of(starting.begin(), starting.end(),
+                     [&](const PathEvent& e) { return is(e, event_name::kBeamOn); }))
+      return;
+    std::erase_if(starting, [&](const PathEvent& e) {
+      return e.kind == PathEvent::Kind::dwell || is(e, event_name::kBeamOn) ||
+             is(e, event_name::kPierce);
+    });
+  }
+
+  /// What `event` of the cut's start has become before point `end` of the cut: another power.
+  ProcessEvent state_at(const Cut& cut, std::size_t end, ProcessEvent event) const {
+    const std::string group = state_group(event.name);
+    if (group.empty()) return event;
+    for (const PathEvent& e : path_.events)
+      if (e.kind == PathEvent::Kind::process && e.point + 1 > cut.first && e.point < end &&
+          state_group(e.event.name) == group)
+        event = e.event;
+    return event;
   }
 
   void shift_cuts(Cut& cut, std::size_t stop, std::size_t again, std::size_t added) {
@@ -166,9 +193,14 @@ class Splitter {
 
 void split_cuts(ToolPath& path, std::vector<Cut>& cuts, const ReferencePath::Frames& frames,
                 const std::vector<SplitPlace>& places, double over_burn) {
-  // From the end, so that the places before stay where they are.
-  for (auto place = places.rbegin(); place != places.rend(); ++place)
-    Splitter(path, cuts, frames, over_burn).split(*place);
+  // From the end, so that the places before stay where they are. Of a segment that was split, only
+  // the part up to there is left for the places before.
+  for (std::size_t i = places.size(); i-- > 0;) {
+    SplitPlace place = places[i];
+    if (i + 1 < places.size() && places[i + 1].segment == place.segment)
+      place.s = std::min(1.0, place.s / places[i + 1].s);
+    Splitter(path, cuts, frames, over_burn).split(place);
+  }
 }
 
 }  // namespace smoothpost

@@ -5,10 +5,13 @@
 #include <cmath>
 
 #include "kernels/core/units.h"
+#include "postproc/pipeline/tool_motion.h"
 
 namespace smoothpost {
 
 namespace {
+
+constexpr double kPrintedRotation = 1e-4;  // deg, that a printed orientation may be off
 
 bool is_rotary(const AxisDefinition& axis) { return axis.joint.kind == JointKind::rotary; }
 double display_scale(const AxisDefinition& axis) {
@@ -244,6 +247,7 @@ class DeviationCheck {
       }
     }
     if (has_beam(machine_)) check_beam_in_links(checks);
+    if (broken_.empty()) check_low_links(checks);
     Check complete;
     complete.name = "path_complete";
     complete.unit = "faults";
@@ -297,25 +301,44 @@ class DeviationCheck {
   void compare_block(std::size_t i) {
     const LineMapEntry& e = in_.map[i];
     const ReadBackMove& move = read_.moves[i];
+    const bool by_tool = move.interpolation == MoveInterpolation::tool;
     const JointVector& from = read_.moves[i - 1].to;
     const double tool_length = in_.reference.path().points[e.segment].tool_length;
     const double span = e.to_share - e.from_share;
-    const auto own = second_derivative_bound(in_.chain, from, move.to);
+    const Pose start = by_tool ? start_pose(i, tool_length) : Pose::Identity();
+    const auto own = by_tool ? tool_motion_bound(start, move.tool, in_.turn, in_.chain.tool_axis)
+                             : second_derivative_bound(in_.chain, from, move.to);
     const auto input = in_.reference.second_derivative_bound(e.segment);
-    const double tip_bend = own.tip + tool_length * own.axis + span * span * input.tip;
+    const double tip_bend =
+        own.tip + (by_tool ? 0.0 : tool_length * own.axis) + span * span * input.tip;
     const double axis_bend = own.axis + span * span * input.axis;
+    const double allowance = by_tool ? turn_allowance(start, move.tool, in_.turn) : 0.0;
     const int steps = steps_for(tip_bend, axis_bend);
     const double h2 = 1.0 / (8.0 * steps * steps);
     for (int k = 0; k <= steps; ++k) {
       const double t = static_cast<double>(k) / steps;
       const CutterLocation wanted = in_.reference.at(e.segment, e.from_share + t * span);
-      const CutterLocation holder = forward_location(in_.chain, from + t * (move.to - from));
-      const Vec3 tip = holder.tip - tool_length * holder.axis;
-      tip_.see((tip - wanted.tip).norm() + h2 * tip_bend, move.line, times_[i], e.input_line);
-      const double chord = (holder.axis - wanted.axis).norm() + h2 * axis_bend;
+      CutterLocation got;
+      if (by_tool) {
+        const Pose pose = tool_motion(start, move.tool, t, in_.turn, in_.chain.tool_axis);
+        got = {pose.translation(), pose.linear() * in_.chain.tool_axis};
+      } else {
+        got = forward_location(in_.chain, from + t * (move.to - from));
+        got.tip -= tool_length * got.axis;
+      }
+      tip_.see((got.tip - wanted.tip).norm() + h2 * tip_bend, move.line, times_[i], e.input_line);
+      const double chord = (got.axis - wanted.axis).norm() + h2 * axis_bend + allowance;
       axis_.see(degrees_from_radians(2.0 * std::asin(std::min(1.0, 0.5 * chord))), move.line,
                 times_[i], e.input_line);
     }
+  }
+
+  // Where the tool stands before a tool move.
+  Pose start_pose(std::size_t i, double tool_length) const {
+    const ReadBackMove& before = read_.moves[i - 1];
+    return before.interpolation == MoveInterpolation::tool
+               ? before.tool
+               : tip_pose(in_.chain, before.to, tool_length);
   }
 
   bool wanted_beam(std::size_t i) const {
@@ -390,6 +413,7 @@ class DeviationCheck {
 
   void compare_joints(std::size_t i) {
     const MachineMove& planned = in_.planned.moves[i];
+    if (planned.interpolation == MoveInterpolation::tool) compare_pose(i, planned);
     for (int j = 0; j < machine_.size(); ++j)
       if (planned.joints >> j & 1U)
         joints_[static_cast<std::size_t>(j)].see(
@@ -398,7 +422,28 @@ class DeviationCheck {
             read_.moves[i].line, times_[i], planned.input_line);
   }
 
+  void compare_pose(std::size_t i, const MachineMove& planned) {
+    const Pose& got = read_.moves[i].tool;
+    pose_tip_.see((got.translation() - planned.tool.translation()).norm(), read_.moves[i].line,
+                  times_[i], planned.input_line);
+    const Mat3 turn = got.linear() * planned.tool.linear().transpose();
+    const double angle = in_.turn == ToolTurn::great_circle
+                             ? angle_between(got.linear() * in_.chain.tool_axis,
+                                             planned.tool.linear() * in_.chain.tool_axis)
+                             : rotation_log(turn).norm();
+    pose_turn_.see(degrees_from_radians(angle), read_.moves[i].line, times_[i], planned.input_line);
+    has_poses_ = true;
+  }
+
   void add_round_trip(Checks& checks) const {
+    if (has_poses_) {
+      const bool inch = machine_.dialect.units == "inch";
+      const double half_digit = 0.5 * std::pow(10.0, -machine_.dialect.digits_length) *
+                                (inch ? kMillimetresPerInch : 1.0);
+      // Frames that the program states are printed too: as much again, and what they turn.
+      checks.push_back(pose_tip_.check("round_trip.tip", 4.0 * half_digit, "mm"));
+      checks.push_back(pose_turn_.check("round_trip.rotation", kPrintedRotation, "deg"));
+    }
     for (int j = 0; j < machine_.size(); ++j) {
       const auto& axis = machine_.axes[static_cast<std::size_t>(j)];
       const bool inch = machine_.dialect.units == "inch";
@@ -409,6 +454,49 @@ class DeviationCheck {
       checks.push_back(joints_[static_cast<std::size_t>(j)].check(
           "round_trip." + axis.name, half_digit * (1.0 + 1e-4), unit_of(axis)));
     }
+  }
+
+  bool over_plane(std::size_t i, int retract) const {
+    const auto& joint = machine_.axes[static_cast<std::size_t>(retract)].joint;
+    const double q = read_.moves[i].to[retract];
+    const double half_digit = 0.5 * std::pow(10.0, -machine_.dialect.digits_length) *
+                              (machine_.dialect.units == "inch" ? kMillimetresPerInch : 1.0);
+    return machine_.links.retract >= 0.5 * (joint.lower + joint.upper)
+               ? q >= machine_.links.retract - half_digit
+               : q <= machine_.links.retract + half_digit;
+  }
+
+  // Links between two cuts that do not go over the retract plane, from the text: without the way
+  // along the tool axis at either end they have to pass clear of the part's box.
+  void check_low_links(Checks& checks) const {
+    const int retract = machine_.axis_by_name(machine_.links.retract_axis);
+    if (!in_.part || retract < 0) return;
+    double least = INFINITY;
+    std::uint32_t line = 0;
+    for (std::size_t i = 0; i + 1 < read_.moves.size(); ++i) {
+      if (in_.map[i].role != MoveRole::path || in_.map[i + 1].role != MoveRole::link) continue;
+      std::size_t end = i + 1;
+      bool plane = false;
+      while (end < read_.moves.size() && in_.map[end].role == MoveRole::link)
+        plane = over_plane(end++, retract) || plane;
+      if (plane || end == read_.moves.size()) continue;
+      std::vector<LinkEnd> waypoints;
+      for (std::size_t k = i + 1; k + 1 < end; ++k)
+        waypoints.push_back({read_.moves[k].to, in_.planned.moves[k].tool_length});
+      const double height = proven_height(in_.chain, waypoints, *in_.part);
+      if (height >= least) continue;
+      least = height;
+      line = read_.moves[i + 1].line;
+    }
+    if (least == INFINITY) return;
+    Check c;
+    c.name = "link_clearance";
+    c.unit = "mm";
+    c.value = least;
+    c.limit = 0.5 * machine_.links.clearance;
+    c.ok = c.value >= c.limit;
+    c.output_line = line;
+    checks.push_back(c);
   }
 
   void check_beam_in_links(Checks& checks) const {
@@ -427,7 +515,8 @@ class DeviationCheck {
   const MachineDefinition& machine_;
   const DeviationInput& in_;
   std::vector<double> times_;
-  Worst tip_, axis_, event_;
+  Worst tip_, axis_, event_, pose_tip_, pose_turn_;
+  bool has_poses_ = false;
   std::array<Worst, kMaxJoints> joints_;
   double wrong_beam_ = 0.0;
   std::uint32_t wrong_beam_line_ = 0;

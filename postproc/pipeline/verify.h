@@ -7,6 +7,7 @@
 #include "kernels/core/progress.h"
 #include "machines/dialects/dialect.h"
 #include "postproc/pipeline/line_map.h"
+#include "postproc/pipeline/links.h"
 #include "postproc/pipeline/reference_path.h"
 
 namespace smoothpost {
@@ -40,7 +41,9 @@ struct DeviationInput {
   const ReferencePath& reference;
   const LineMap& map;
   const MachineProgram& planned;
-  const ScrewChain& chain;  ///< output machine, tool length 0, part placed
+  const ScrewChain& chain;           ///< output machine, tool length 0, part placed
+  ToolTurn turn = ToolTurn::none;    ///< of the dialect
+  std::optional<PartBox> part = {};  ///< where low links are proven to pass it
 };
 
 /// The output's text, read back, against the input: tip and tool axis everywhere along every block

@@ -1,4 +1,3 @@
-#include "postproc/pipeline/cuts.h"
 #include "postproc/pipeline/convert.h"
 
 #include <catch2/catch.hpp>
@@ -7,6 +6,7 @@
 
 #include "kernels/core/units.h"
 #include "kernels/geometry/triangle_tree.h"
+#include "postproc/pipeline/cuts.h"
 #include "postproc/pipeline/trajectory.h"
 #include "tests/support/machines.h"
 
@@ -20,7 +20,6 @@ ToolPath with_links(ToolPath path) {
   find_cuts(path, {});
   return path;
 }
-
 
 InputSettings posted_for(const char* machine) {
   InputSettings settings;

@@ -1,10 +1,10 @@
-#include "postproc/pipeline/cuts.h"
 #include "postproc/pipeline/path_match.h"
 
 #include <catch2/catch.hpp>
 
 #include "kernels/core/units.h"
 #include "postproc/pipeline/convert.h"
+#include "postproc/pipeline/cuts.h"
 #include "tests/support/machines.h"
 
 using namespace smoothpost;
@@ -17,7 +17,6 @@ ToolPath with_links(ToolPath path) {
   find_cuts(path, {});
   return path;
 }
-
 
 const std::string kProgram =
     "%\nM428\nG21 G90 G94\nG0 X0 Y0 Z20 A0 C0\nG0 Z1\nG1 X8 F600\nG1 X8 Y5\nG1 X0 Y5 A-20 C10\nG1 "
@@ -43,7 +42,7 @@ struct Fixture {
 
   PathMatch match(const ReadBack& read) const {
     const ToolPath cut_path = with_links(in.input.path);
-  const ReferencePath reference(cut_path, in.input.frames);
+    const ReferencePath reference(cut_path, in.input.frames);
     return match_paths(read, chain, reference,
                        {in.machine.tolerance.tip, in.machine.tolerance.axis}, {});
   }

@@ -105,6 +105,7 @@ typedef struct smoothpost_options {
   int force;
   smoothpost_progress progress;
   void* progress_user;
+  const char* integer_unit; /* fanuc, haas: what one unit of a number without point is: 1 | 0.001 */
 } smoothpost_options;
 
 /* All members to "not given". `size` is sizeof(smoothpost_options) as the caller knows it. */

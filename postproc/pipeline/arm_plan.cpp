@@ -1,0 +1,310 @@
+#include "postproc/pipeline/arm_plan.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "kernels/core/units.h"
+#include "kernels/kinematics/arm_tracking.h"
+#include "kernels/kinematics/inverse.h"
+#include "postproc/pipeline/plan_messages.h"
+#include "postproc/pipeline/tool_motion.h"
+
+namespace smoothpost {
+
+namespace {
+
+constexpr double kAxisStep = 2.0 * kRadiansPerDegree;  // between tracked points
+constexpr double kTipStep = 25.0;                      // mm
+constexpr int kMaxSplits = 30;
+constexpr int kCloser = 16;  // parts of a motion that is looked at more closely
+constexpr int kCloserLooks = 2;
+constexpr int kSpins = 24;
+constexpr std::size_t kThinned = 160;  // points on which spins are compared
+constexpr double kOpposite = 20.0 * kRadiansPerDegree;
+
+/// The least rotation that takes unit vector a to unit vector b.
+Mat3 least_rotation(const Vec3& a, const Vec3& b) {
+  return Eigen::Quaterniond::FromTwoVectors(a, b).toRotationMatrix();
+}
+
+class ArmPlanner {
+ public:
+  ArmPlanner(const ReferencePath& reference, const SixR& arm, const Inverse& inverse,
+             const JointPlanSettings& settings, const Progress& progress)
+      : reference_(reference),
+        arm_(arm),
+        inverse_(inverse),
+        settings_(settings),
+        progress_(progress) {}
+
+  /// With the first spin, best first, that has a way without a split; as the best one ends if none.
+  Result<JointPlan> run() {
+    collect();
+    choose_reference_axis();
+    const std::vector<double> spins =
+        settings_.spin ? std::vector<double>{*settings_.spin} : spins_by_score();
+    std::optional<Result<JointPlan>> first;
+    for (const double spin : spins) {
+      Result<JointPlan> plan = plan_with(spin);
+      if (cancelled_ || (plan.ok() && plan.value().splits.empty())) return plan;
+      if (!first || (plan.ok() && !first->ok())) first = std::move(plan);
+    }
+    return std::move(*first);
+  }
+
+ private:
+  Result<JointPlan> plan_with(double spin) {
+    spin_ = spin;
+    samples_.clear();
+    BranchTracking tracking = track(tracked_, spin_);
+    for (int k = 0; k < kCloserLooks && look_closer(tracking); ++k)
+      tracking = track(tracked_, spin_);
+    JointPlan plan;
+    if (tracking.status == BranchTracking::Status::rewind_needed && settings_.may_split) {
+      for (const auto& rewind : tracking.rewinds)
+        plan.splits.push_back({tracked_[rewind.point - 1].segment, tracked_[rewind.point - 1].s});
+      return Result<JointPlan>(std::move(plan));
+    }
+    if (tracking.status != BranchTracking::Status::ok)
+      return Result<JointPlan>::failure(
+          tracking_failure(tracking, line_of(tracking.point), settings_));
+    return samples_of(tracking);
+  }
+
+  /// Puts points between those that the joints found no way between: beside a singular wrist they
+  /// turn far on a short way, and that is no jump. Nothing to do: false.
+  bool look_closer(const BranchTracking& tracking) {
+    if (tracking.status != BranchTracking::Status::rewind_needed) return false;
+    for (auto rewind = tracking.rewinds.rbegin(); rewind != tracking.rewinds.rend(); ++rewind) {
+      const JointSample to = tracked_[rewind->point];
+      const JointSample& before = tracked_[rewind->point - 1];
+      const double from = before.segment == to.segment ? before.s : 0.0;
+      std::vector<JointSample> between;
+      for (int k = 1; k < kCloser; ++k)
+        between.push_back({to.segment, from + (to.s - from) * k / kCloser, 0, {}});
+      tracked_.insert(tracked_.begin() + static_cast<std::ptrdiff_t>(rewind->point),
+                      between.begin(), between.end());
+    }
+    return true;
+  }
+
+  Result<JointPlan> samples_of(const BranchTracking& tracking) {
+    for (std::size_t i = 0; i < tracked_.size(); ++i) {
+      JointSample to = tracked_[i];
+      to.q = tracking.q[i];
+      to.branch = tracking.branch[i];
+      if (i > 0 && !replanned(to.segment)) {
+        JointSample from = samples_.back();
+        if (from.segment != to.segment) {
+          from.segment = to.segment;
+          from.s = 0.0;
+        }
+        if (!refine(from, to, 0))
+          return Result<JointPlan>::failure(too_steep(line_at(to.segment), settings_));
+      }
+      samples_.push_back(std::move(to));
+      if (i % 4096 == 0 &&
+          !progress_("kinematics", static_cast<double>(i) / static_cast<double>(tracked_.size()))) {
+        cancelled_ = true;
+        return Result<JointPlan>::failure(plan_cancelled());
+      }
+    }
+    JointPlan plan;
+    plan.samples = std::move(samples_);
+    return Result<JointPlan>(std::move(plan));
+  }
+
+  bool replanned(std::size_t segment) const {
+    return segment > 0 && reference_.path().points[segment].replanned;
+  }
+  std::uint32_t line_at(std::size_t segment) const {
+    return reference_.path().points[segment].line;
+  }
+  std::uint32_t line_of(std::size_t tracked) const { return line_at(tracked_[tracked].segment); }
+
+  CutterLocation location(std::size_t segment, double s) const {
+    return segment == 0 ? reference_.path().points[0].location : reference_.at(segment, s);
+  }
+
+  void add(std::size_t segment, double s) {
+    tracked_.push_back({static_cast<std::uint32_t>(segment), s, 0, {}});
+  }
+
+  void collect() {
+    if (reference_.segments() == 0 || !replanned(1)) add(0, 1.0);
+    for (std::size_t k = 1; k <= reference_.segments(); ++k) {
+      if (!replanned(k))
+        subdivide(k, 0.0, 1.0, 0);
+      else if (k < reference_.segments() && !replanned(k + 1))
+        add(k, 1.0);
+    }
+  }
+
+  void subdivide(std::size_t segment, double from, double to, int depth) {
+    const CutterLocation a = location(segment, from);
+    const CutterLocation b = location(segment, to);
+    const auto bend = reference_.second_derivative_bound(segment);
+    const double span = to - from;
+    const bool turns = std::sqrt(bend.axis) * span > kAxisStep;
+    const bool bends = span * span * bend.tip / 8.0 > kTipStep;
+    if (depth < kMaxSplits && (turns || bends || (a.tip - b.tip).norm() > kTipStep)) {
+      const double mid = 0.5 * (from + to);
+      subdivide(segment, from, mid, depth + 1);
+      subdivide(segment, mid, to, depth + 1);
+      return;
+    }
+    add(segment, to);
+  }
+
+  // The axis of W that the path's tool axes stay farthest from the opposite of; +Z when it will do.
+  void choose_reference_axis() {
+    const std::array<Vec3, 6> axes = {Vec3::UnitZ(),  Vec3::UnitX(),  Vec3::UnitY(),
+                                      -Vec3::UnitX(), -Vec3::UnitY(), -Vec3::UnitZ()};
+    double best = -1.0;
+    for (const Vec3& axis : axes) {
+      double least = kPi;
+      for (const auto& t : tracked_)
+        least = std::min(least, angle_between(location(t.segment, t.s).axis, -axis));
+      if (least <= best) continue;
+      best = least;
+      reference_axis_ = axis;
+      if (least > kOpposite) break;
+    }
+    const Mat3 home = forward(arm_.chain(), settings_.held).linear();
+    home_ = least_rotation(home * arm_.chain().tool_axis, reference_axis_) * home;
+  }
+
+  Pose holder(std::size_t segment, double s, double spin) const {
+    const CutterLocation at = location(segment, s);
+    Pose pose = Pose::Identity();
+    pose.linear() =
+        least_rotation(reference_axis_, at.axis) * rotation_about(reference_axis_, spin) * home_;
+    pose.translation() = at.tip;
+    return holder_pose(arm_.chain(), pose, reference_.path().points[segment].tool_length);
+  }
+
+  BranchTracking track(const std::vector<JointSample>& samples, double spin) const {
+    std::vector<ArmPoint> points(samples.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      points[i].tool = holder(samples[i].segment, samples[i].s, spin);
+      points[i].line = line_at(samples[i].segment);
+      points[i].cut = i > 0 && !replanned(samples[i].segment);
+    }
+    ArmTrackingSettings s;
+    s.start = settings_.held;
+    return track_arm(arm_, points, s);
+  }
+
+  // Share of the range that is left at the tightest joint, and the sine of the wrist's angle.
+  double margin(const JointVector& q) const {
+    double least = 1.0;
+    for (int j = 0; j < 6; ++j) {
+      const ChainJoint& joint = arm_.chain().joints[static_cast<std::size_t>(j)];
+      const double half = 0.5 * (joint.upper - joint.lower);
+      least = std::min(least, 1.0 - std::abs(q[j] - 0.5 * (joint.upper + joint.lower)) / half);
+    }
+    const Mat3 wrist = jacobian(arm_.chain(), q).block<3, 3>(0, 3);
+    return std::min(least, std::abs(wrist.determinant()));
+  }
+
+  std::vector<double> spins_by_score() const {
+    // Neighbours on the thinned path are far apart: only reach, limits and posture count there.
+    std::vector<JointSample> thinned;
+    const std::size_t step = tracked_.size() / kThinned + 1;
+    for (std::size_t i = 0; i < tracked_.size(); i += step) thinned.push_back(tracked_[i]);
+    thinned.push_back(tracked_.back());
+    std::vector<std::pair<double, double>> scored;  // score, spin
+    for (int k = 0; k < kSpins; ++k) {
+      const double spin = 2.0 * kPi / kSpins * ((k % 2 == 1) ? -(k + 1) / 2 : k / 2);
+      scored.emplace_back(score_of(thinned, spin), spin);
+    }
+    std::stable_sort(scored.begin(), scored.end(),
+                     [](const auto& a, const auto& b) { return a.first > b.first; });
+    std::vector<double> spins;
+    for (const auto& entry : scored) spins.push_back(entry.second);
+    return spins;
+  }
+
+  // Of the branch that serves the whole thinned path best; unreachable points count −1 each.
+  double score_of(const std::vector<JointSample>& thinned, double spin) const {
+    std::array<double, 8> score;
+    score.fill(1.0);
+    for (const auto& t : thinned) {
+      const SixRSolutions solved = arm_.solve(holder(t.segment, t.s, spin), settings_.held);
+      for (std::size_t b = 0; b < 8; ++b) {
+        double here = -1.0;
+        if (solved.valid[b]) {
+          JointVector q = solved.q[b];
+          for (int j = 0; j < 6; ++j) {
+            const ChainJoint& joint = arm_.chain().joints[static_cast<std::size_t>(j)];
+            const double middle = 0.5 * (joint.upper + joint.lower);
+            q[j] += 2.0 * kPi * std::round((middle - q[j]) / (2.0 * kPi));
+          }
+          here = margin(q);
+        }
+        if (here < 0.0)
+          score[b] = std::min(score[b], 0.0) - 1.0;
+        else
+          score[b] = std::min(score[b], here);
+      }
+    }
+    return *std::max_element(score.begin(), score.end());
+  }
+
+  bool refine(const JointSample& from, const JointSample& to, int depth) {
+    if (follows(from, to)) return true;
+    if (depth >= kMaxSplits) return false;
+    JointSample mid;
+    mid.segment = to.segment;
+    mid.s = 0.5 * (from.s + to.s);
+    const auto q = inverse_.nearest(holder(mid.segment, mid.s, spin_), 0.5 * (from.q + to.q));
+    if (!q) return false;
+    mid.q = *q;
+    mid.branch = to.branch;
+    if (!refine(from, mid, depth + 1)) return false;
+    samples_.push_back(mid);
+    return refine(mid, to, depth + 1);
+  }
+
+  bool follows(const JointSample& from, const JointSample& to) const {
+    const ScrewChain& chain = arm_.chain();
+    const double length = reference_.path().points[to.segment].tool_length;
+    const Pose a = tip_pose(chain, from.q, length);
+    const Pose b = tip_pose(chain, to.q, length);
+    const double allowance = settings_.tool_moves ? turn_allowance(a, b, ToolTurn::slerp) : 0.0;
+    for (const double t : {0.25, 0.5, 0.75}) {
+      const CutterLocation wanted = reference_.at(to.segment, from.s + t * (to.s - from.s));
+      const Pose pose = settings_.tool_moves
+                            ? tool_motion(a, b, t, ToolTurn::slerp, chain.tool_axis)
+                            : tip_pose(chain, from.q + t * (to.q - from.q), length);
+      if ((pose.translation() - wanted.tip).norm() > 0.8 * settings_.tip_tolerance) return false;
+      if ((pose.linear() * chain.tool_axis - wanted.axis).norm() + allowance >
+          0.8 * settings_.axis_tolerance)
+        return false;
+    }
+    return true;
+  }
+
+  const ReferencePath& reference_;
+  const SixR& arm_;
+  const Inverse& inverse_;
+  const JointPlanSettings& settings_;
+  const Progress& progress_;
+  Vec3 reference_axis_ = Vec3::UnitZ();
+  Mat3 home_ = Mat3::Identity();  ///< rotation with the tool along the reference axis, ψ = 0
+  double spin_ = 0.0;
+  bool cancelled_ = false;
+  std::vector<JointSample> tracked_;
+  std::vector<JointSample> samples_;
+};
+
+}  // namespace
+
+Result<JointPlan> plan_arm(const ReferencePath& reference, const SixR& arm,
+                           const JointPlanSettings& settings, const Progress& progress) {
+  const auto inverse = Inverse::from(arm.chain());
+  return ArmPlanner(reference, arm, *inverse, settings, progress).run();
+}
+
+}  // namespace smoothpost
