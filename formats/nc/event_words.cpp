@@ -1,6 +1,7 @@
 #include "formats/nc/event_words.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "formats/nc/number.h"
@@ -197,6 +198,22 @@ Result<std::string> render_event(const EventWords& words, const EventParameters&
                      "process event \"" + words.event + "\" is written \"" + words.text +
                          "\", but the program gives no value \"" + std::string(name) +
                          "\"; let the input machine's row name it, or write a number in this row",
+                     {}});
+    }
+    // X{value} is an address and its number; a name there would be another command.
+    const bool address = i > 0 && std::isalpha(static_cast<unsigned char>(text[i - 1])) != 0 &&
+                         (i < 2 || std::isalpha(static_cast<unsigned char>(text[i - 2])) == 0);
+    const char* const value_end = found->second.data() + found->second.size();
+    const ScannedNumber number = scan_number(found->second.data(), value_end);
+    if (address && (!number.ok || number.next != value_end)) {
+      return Result<std::string>::failure(
+          Diagnostic{Severity::error,
+                     "PR112",
+                     "process event \"" + words.event + "\" is written \"" + words.text +
+                         "\" with a number, but the program gives " + std::string(name) + " = \"" +
+                         found->second +
+                         "\"; for a tool say its number with --tool NAME:N=length, or let the row "
+                         "take a name",
                      {}});
     }
     out += found->second;

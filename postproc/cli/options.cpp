@@ -56,7 +56,7 @@ void add_input_options(CLI::App* app, CommandLine& l) {
                   "G54=x,y,z[,a,b,c]: the program's zero on the input machine")
       ->take_all()
       ->allow_extra_args(false);
-  app->add_option("--tool", l.tool, "N=length in mm, repeatable")
+  app->add_option("--tool", l.tool, "N=length or NAME:N=length in mm, NAME as the input calls the tool; repeatable")
       ->take_all()
       ->allow_extra_args(false);
   app->add_option("--tip-tolerance", l.tip_tolerance, "mm");

@@ -77,7 +77,8 @@ class Run {
     const auto tools = read_tools(options_.tool);
     add(tools.diagnostics());
     if (!tools.ok()) return finish();
-    if (!tools.value().empty()) in.tool_length = tools.value().begin()->second;
+    if (!tools.value().lengths.empty())
+      in.tool_length = tools.value().lengths.begin()->second;
     in.text = std::move(input_bytes_);
     if (!options_.against.empty() && !read_against(in)) return finish();
     in.file_name = input_name_;
@@ -242,7 +243,8 @@ class Run {
     add(tools.diagnostics());
     add(offsets.diagnostics());
     if (!tools.ok() || !offsets.ok()) return false;
-    settings.tool_lengths = std::move(tools.value());
+    settings.tool_lengths = std::move(tools.value().lengths);
+    settings.tool_numbers = std::move(tools.value().numbers);
     for (const auto& offset : offsets.value()) {
       nc::WorkOffset words;
       for (int i = 0; i < 3; ++i) {

@@ -91,7 +91,7 @@ void write_test_program(const MachineDefinition& machine, const Options& options
   const auto tools = read_tools(options.tool);
   add(tools.diagnostics());
   if (!tools.ok()) return;
-  const double length = tools.value().empty() ? 0.0 : tools.value().begin()->second;
+  const double length = tools.value().lengths.empty() ? 0.0 : tools.value().lengths.begin()->second;
   const auto test = make_test_program(machine, length);
   add(test.diagnostics());
   if (!test.ok()) return;

@@ -170,23 +170,47 @@ Result<std::vector<OffsetOption>> read_offsets(const std::vector<std::string>& t
   return offsets;
 }
 
-Result<std::map<int, double>> read_tools(const std::vector<std::string>& texts) {
-  std::map<int, double> tools;
+namespace {
+
+/// "N=length" or "NAME:N=length".
+struct ToolOption {
+  std::string name;
+  int number = 0;
+  double length = 0.0;
+};
+
+std::optional<ToolOption> read_tool(const std::string& text) {
+  const auto equals = text.rfind('=');
+  if (equals == std::string::npos) return {};
+  const auto colon = text.rfind(':', equals);
+  const std::size_t begin = colon == std::string::npos ? 0 : colon + 1;
+  const auto number = read_number(text.substr(begin, equals - begin));
+  const auto length = read_number(text.substr(equals + 1));
+  if (!number || !length || *number < 1 || *number != std::floor(*number) || *number > 99999 ||
+      *length < 0.0 || *length > 10000.0 || colon == 0)
+    return {};
+  return ToolOption{colon == std::string::npos ? "" : text.substr(0, colon),
+                    static_cast<int>(*number), *length};
+}
+
+}  // namespace
+
+Result<ToolTable> read_tools(const std::vector<std::string>& texts) {
+  ToolTable tools;
   Diagnostics errors;
   for (const auto& text : texts) {
-    const auto at = text.find('=');
-    const auto number = at == std::string::npos ? std::nullopt : read_number(text.substr(0, at));
-    const auto length = at == std::string::npos ? std::nullopt : read_number(text.substr(at + 1));
-    if (!number || !length || *number < 1 || *number != std::floor(*number) || *number > 99999 ||
-        *length < 0.0 || *length > 10000.0)
-      errors.push_back(
-          usage_error("US143", "--tool " + text +
-                                   ": expected is N=length, a tool number and its length in "
-                                   "mm (0 to 10000)"));
-    else
-      tools[static_cast<int>(*number)] = *length;
+    const auto tool = read_tool(text);
+    if (!tool) {
+      errors.push_back(usage_error(
+          "US143", "--tool " + text +
+                       ": expected is N=length or NAME:N=length, a tool number, its length in mm "
+                       "(0 to 10000), and the name that the input calls it by"));
+      continue;
+    }
+    tools.lengths[tool->number] = tool->length;
+    if (!tool->name.empty()) tools.numbers[tool->name] = tool->number;
   }
-  if (!errors.empty()) return Result<std::map<int, double>>::failure(std::move(errors));
+  if (!errors.empty()) return Result<ToolTable>::failure(std::move(errors));
   return tools;
 }
 

@@ -40,8 +40,14 @@ struct OffsetOption {
 Result<std::vector<OffsetOption>> read_offsets(const std::vector<std::string>& texts,
                                                const std::string& option);
 
-/// "N=length" for every entry, mm.
-Result<std::map<int, double>> read_tools(const std::vector<std::string>& texts);
+/// Tools of the input: lengths (mm) by number, and the numbers of tools that it calls by a name.
+struct ToolTable {
+  std::map<int, double> lengths;
+  std::map<std::string, int> numbers;
+};
+
+/// --tool N=length or NAME:N=length, repeated. US143.
+Result<ToolTable> read_tools(const std::vector<std::string>& texts);
 
 /// A finite decimal number; nothing for anything else.
 std::optional<double> read_number(std::string_view text);

@@ -193,8 +193,12 @@ class PathBuilder {
       if (e.event.name == event_name::kBeamOn || e.event.name == event_name::kPierce) beam_ = true;
       if (e.event.name == event_name::kBeamOff) beam_ = false;
       if (e.event.name == event_name::kToolChange) {
-        for (const auto& [key, value] : e.event.parameters)
-          if (key == "tool") tool_in_use(std::atoi(value.c_str()));
+        for (auto& [key, value] : e.event.parameters) {
+          if (key != "tool") continue;
+          const auto number = settings_.tool_numbers.find(value);
+          if (number != settings_.tool_numbers.end()) value = std::to_string(number->second);
+          tool_in_use(std::atoi(value.c_str()));
+        }
       }
     }
     out_.path.events.push_back(std::move(e));

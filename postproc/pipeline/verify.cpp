@@ -466,6 +466,15 @@ class DeviationCheck {
                : q <= machine_.links.retract + half_digit;
   }
 
+  // A rapid of several axes on a machine whose axes do not arrive together: its way is not known.
+  bool wanders(std::size_t i) const {
+    if (machine_.links.rapid != RapidMotion::independent || !read_.moves[i].rapid) return false;
+    int moving = 0;
+    for (int j = 0; j < machine_.size(); ++j)
+      if (read_.moves[i].to[j] != read_.moves[i - 1].to[j]) ++moving;
+    return moving > 1;
+  }
+
   // Links between two cuts that do not go over the retract plane, from the text: without the way
   // along the tool axis at either end they have to pass clear of the part's box.
   void check_low_links(Checks& checks) const {
@@ -477,13 +486,17 @@ class DeviationCheck {
       if (in_.map[i].role != MoveRole::path || in_.map[i + 1].role != MoveRole::link) continue;
       std::size_t end = i + 1;
       bool plane = false;
-      while (end < read_.moves.size() && in_.map[end].role == MoveRole::link)
-        plane = over_plane(end++, retract) || plane;
+      bool unknown = false;
+      for (; end < read_.moves.size() && in_.map[end].role == MoveRole::link; ++end) {
+        plane = over_plane(end, retract) || plane;
+        unknown = wanders(end) || unknown;
+      }
       if (plane || end == read_.moves.size()) continue;
       std::vector<LinkEnd> waypoints;
       for (std::size_t k = i + 1; k + 1 < end; ++k)
         waypoints.push_back({read_.moves[k].to, in_.planned.moves[k].tool_length});
-      const double height = proven_height(in_.chain, waypoints, *in_.part);
+      const double height =
+          unknown ? -INFINITY : proven_height(in_.chain, waypoints, *in_.part);
       if (height >= least) continue;
       least = height;
       line = read_.moves[i + 1].line;
@@ -495,6 +508,8 @@ class DeviationCheck {
     c.value = least;
     c.limit = 0.5 * machine_.links.clearance;
     c.ok = c.value >= c.limit;
+    if (least == -INFINITY)
+      c.note = "a rapid of several axes that need not arrive together passes the part low";
     c.output_line = line;
     checks.push_back(c);
   }

@@ -1,11 +1,12 @@
 #!/usr/bin/python3
 """Writes a headless LinuxCNC configuration for a machine file.
 
-    make_config.py MACHINE.toml OUTDIR [--kins triv|trt] [--g54 X=1.5,C=2] [--g92 X=1] [--tool 1=50]
+    make_config.py MACHINE.toml OUTDIR [--kins triv|trt|head] [--g54 X=1.5,C=2] [--g92 X=1] [--tool 1=50]
 
 triv: joint i is the i-th axis of the file and the words of a program are joints. trt: the axes go
 through LinuxCNC's own xyzac-trt-kins or xyzbc-trt-kins; M428 switches tool-centre-point mode on
-and M429 off again. --g54 and --g92 leave a work offset or a G92 shift alive in the controller;
+and M429 off again. head: they go through its 5axiskins, a head C B with a pivot PIVOT_LENGTH above
+the tip, which is on from the start and needs the letters X Y Z B C W. --g54 and --g92 leave a work offset or a G92 shift alive in the controller;
 --tool sets the length of a tool (tool table column Z).
 
 In OUTDIR: headless.ini, headless.hal, tool.tbl, headless.var, subroutines/, channels.json (the
@@ -21,6 +22,7 @@ from machine_model import Machine, fail
 AXIS_ORDER = "XYZABCUVW"
 OUTPUTS = 4          # digital outputs logged
 SAMPLER_DEPTH = 16384  # samples
+PIVOT_LENGTH = 250.0   # mm, of 5axiskins
 
 
 def parse_assignments(text):
@@ -49,13 +51,23 @@ def trt_module(machine):
     return f"xyz{letters.lower()}-trt-kins"
 
 
+def fits_head_module(machine):
+    """Whether 5axiskins has the axes of the machine; its head turns about C, then B."""
+    heads = [axis.letter for axis in machine.axes if axis.rotary and not axis.on_workpiece]
+    return heads == ["C", "B"] and sorted(machine.letters) == sorted("XYZBCW")
+
+
+def kinematics_text(machine, kins):
+    coordinates = f"coordinates={machine.letters.lower()}"
+    if kins == "trt":
+        return f"{trt_module(machine)} {coordinates} sparm=identityfirst"
+    if kins == "head":
+        return f"5axiskins {coordinates}"
+    return f"trivkins {coordinates} kinstype=both"
+
+
 def ini_text(machine, kins):
     coordinates = "".join(sorted(machine.letters, key=AXIS_ORDER.index))
-    if kins == "triv":
-        kinematics = f"trivkins coordinates={machine.letters.lower()} kinstype=both"
-    else:
-        module = trt_module(machine)
-        kinematics = f"{module} coordinates={machine.letters.lower()} sparm=identityfirst"
     linear = [axis for axis in machine.axes if not axis.rotary]
     rotary = [axis for axis in machine.axes if axis.rotary]
     together = lambda values: math.sqrt(sum(value * value for value in values))
@@ -69,7 +81,7 @@ def ini_text(machine, kins):
         ("TASK", [("TASK", "milltask"), ("CYCLE_TIME", 0.001)]),
         ("HAL", [("HALFILE", "headless.hal")]),
         ("EMCIO", [("EMCIO", "io"), ("CYCLE_TIME", 0.1), ("TOOL_TABLE", "tool.tbl")]),
-        ("KINS", [("KINEMATICS", kinematics), ("JOINTS", len(machine.axes))]),
+        ("KINS", [("KINEMATICS", kinematics_text(machine, kins)), ("JOINTS", len(machine.axes))]),
         ("TRAJ", [("COORDINATES", coordinates), ("LINEAR_UNITS", "mm"), ("ANGULAR_UNITS", "degree"),
                   ("DEFAULT_LINEAR_VELOCITY", together(a.velocity for a in linear)),
                   ("MAX_LINEAR_VELOCITY", together(a.velocity for a in linear)),
@@ -131,6 +143,8 @@ def hal_text(machine, kins):
     if kins == "trt":
         lines.append("net kinematics-type motion.analog-out-03 motion.switchkins-type")
         lines.append(f"net tool-length motion.tooloffset.z {trt_module(machine)}.tool-offset")
+    if kins == "head":
+        lines.append(f"setp 5axiskins.pivot-length {PIVOT_LENGTH}")
     return "\n".join(lines) + "\n"
 
 
@@ -162,6 +176,8 @@ def tool_text(tools):
 def write_config(machine, outdir, kins="triv", g54=None, g92=None, tools=None):
     if kins == "trt" and trt_module(machine) is None:
         raise ValueError(f"{machine.name}: LinuxCNC has no table-table kinematics for this chain")
+    if kins == "head" and not fits_head_module(machine):
+        raise ValueError(f"{machine.name}: 5axiskins has other axes than this machine")
     os.makedirs(os.path.join(outdir, "subroutines"), exist_ok=True)
     files = {
         "headless.ini": ini_text(machine, kins), "headless.hal": hal_text(machine, kins),
@@ -179,7 +195,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("machine")
     parser.add_argument("outdir")
-    parser.add_argument("--kins", choices=("triv", "trt"), default="triv")
+    parser.add_argument("--kins", choices=("triv", "trt", "head"), default="triv")
     parser.add_argument("--g54", default="")
     parser.add_argument("--g92", default="")
     parser.add_argument("--tool", action="append", default=[], metavar="N=LENGTH")

@@ -269,7 +269,7 @@ TEST_CASE("siemens_840d: behind a tool change the tool length is stated anew",
     change.event.parameters = {{"tool", "5"}};
     program.actions = {change};
     const auto text = emitted_text(machine, program);
-    const auto at = text.find("T5 M6");
+    const auto at = text.find("T=\"5\" M6");
     REQUIRE(at != std::string::npos);
     CHECK(text.find(poses ? " D1\n" : " D0\n", at) < text.find(" X", at));
     CHECK(read(machine, text).moves.size() == 6);

@@ -93,6 +93,100 @@ TEST_CASE("corpus: both boat programs are certified on the B/C table",
   }
 }
 
+TEST_CASE("corpus: both boat programs on a robot, a head-table machine and an offset laser",
+          "[postproc][pipeline][corpus]") {
+  for (const auto& [name, from] :
+       {std::pair{"boat-xyzac.ngc", "table_table_ac"}, {"boat-xyzbc.ngc", "table_table_bc"}}) {
+    for (const char* to : {"robot_6r", "head_table_bc", "laser_5p1_offset"}) {
+      auto input = boat(name, from);
+      if (!input) {
+        WARN("no corpus: skipped");
+        return;
+      }
+      ConvertInput in;
+      in.input = std::move(*input);
+      in.machine = shipped_machine(to);
+      in.input_name = name;
+      const bool laser = std::string(to) == "laser_5p1_offset";
+      if (laser) in.placement.translation() = Vec3(700, 600, 1000);
+      const Conversion c = convert(in, false, {});
+      INFO(name << " to " << to);
+      for (const auto& d : c.diagnostics) UNSCOPED_INFO(to_string(d));
+      if (!laser) {
+        CHECK(c.verdict == Verdict::certified);
+        CHECK(c.checks_ok());
+        continue;
+      }
+      // A laser has no words for a mill's spindle: refused by name, with the input's line.
+      CHECK(c.verdict == Verdict::refused);
+      const auto spindle = std::find_if(
+          c.diagnostics.begin(), c.diagnostics.end(), [](const Diagnostic& d) {
+            return d.code == "PR201" && d.text.find("spindle_on") != std::string::npos;
+          });
+      REQUIRE(spindle != c.diagnostics.end());
+      CHECK(spindle->where.line > 0);
+    }
+  }
+}
+
+TEST_CASE("corpus: a SINUMERIK program with TRAORI and frames", "[postproc][pipeline][corpus]") {
+  const auto path = shared_path(
+      "corpus/1_five_axis/ElMoe/NC_code/Coordinate_system_representation_Achskreuz/"
+      "Coordinate_system_representation_Achskreuz.mpf");
+  if (!path) {
+    WARN("no corpus: skipped");
+    return;
+  }
+  const std::string text = read_bytes(*path);
+  InputSettings settings;
+  settings.file_name = "Achskreuz.mpf";
+  // Rotary words, spindle and coolant need the machine that it was posted for: each named once.
+  const auto refused = interpret_nc(text, settings);
+  REQUIRE_FALSE(refused.ok());
+  bool rotary = false;
+  for (const auto& d : refused.diagnostics())
+    if (d.severity == Severity::error) {
+      CHECK(d.where.line > 0);
+      CHECK(d.where.column > 0);
+      rotary = rotary || d.text.find("--input-machine") != std::string::npos;
+    }
+  CHECK(rotary);
+
+  settings.machine = shipped_machine("head_table_bc");
+  settings.process = settings.machine->process;
+  settings.process->unmapped = UnmappedWords::comment;
+  auto read = interpret_nc(text, settings);
+  for (const auto& d : read.diagnostics()) UNSCOPED_INFO(to_string(d));
+  REQUIRE(read.ok());
+  CHECK(read.value().dialect == "siemens");
+  // Tools by name: a control with T numbers has to be told them.
+  {
+    ConvertInput in;
+    in.input = read.value();
+    in.machine = shipped_machine("table_table_bc");
+    const Conversion c = convert(in, false, {});
+    CHECK(c.verdict == Verdict::refused);
+    CHECK(std::any_of(c.diagnostics.begin(), c.diagnostics.end(), [](const Diagnostic& d) {
+      return d.code == "PR112" && d.where.line > 0;
+    }));
+  }
+  settings.tool_numbers = {{"PLAN_D50_N_AP4", 1},
+                           {"SCHAFT_D12_N_AP30", 2},
+                           {"SCHAFT_D6_N_AP15", 3},
+                           {"ENTFRAESER_D8_N_90GRAD", 4}};
+  const auto numbered = interpret_nc(text, settings);
+  REQUIRE(numbered.ok());
+  for (const char* to : {"head_table_bc", "table_table_bc"}) {
+    ConvertInput in;
+    in.input = std::string(to) == "table_table_bc" ? numbered.value() : read.value();
+    in.machine = shipped_machine(to);
+    in.input_name = "Achskreuz.mpf";
+    const Conversion c = convert(in, false, {});
+    for (const auto& d : c.diagnostics) UNSCOPED_INFO(to_string(d));
+    CHECK(c.verdict == Verdict::certified);
+  }
+}
+
 TEST_CASE("corpus: the boat posted for A/C and for B/C is one tool path",
           "[postproc][pipeline][corpus]") {
   const auto ac = boat("boat-xyzac.ngc", "table_table_ac");
@@ -151,4 +245,40 @@ TEST_CASE("corpus: the 34,000 line B/C program of a printer", "[postproc][pipeli
   for (const auto& d : c.diagnostics) UNSCOPED_INFO(to_string(d));
   CHECK(c.verdict == Verdict::certified);
   CHECK(c.blocks > 34000);
+}
+
+TEST_CASE("corpus: the 34,000 line program on a robot, a head-table machine and an offset laser",
+          "[postproc][pipeline][corpus][.slow]") {
+  const auto path = shared_path("corpus/1_five_axis/zhangty019/DataSet/Gcode/model_1_Gcode.txt.gz");
+  if (!path) {
+    WARN("no corpus: skipped");
+    return;
+  }
+  InputSettings settings;
+  settings.file_name = "model_1_Gcode.txt";
+  settings.machine = shipped_machine("table_table_bc");
+  settings.process = settings.machine->process;
+  settings.process->unmapped = UnmappedWords::comment;
+  const auto read = interpret_nc(read_bytes(*path), settings);
+  REQUIRE(read.ok());
+  for (const char* to : {"robot_6r", "head_table_bc", "laser_5p1_offset"}) {
+    ConvertInput in;
+    in.input = read.value();
+    in.machine = shipped_machine(to);
+    in.input_name = "model_1_Gcode.txt";
+    if (std::string(to) == "laser_5p1_offset") {
+      in.placement.translation() = Vec3(700, 600, 1000);
+      // Its C winds on in one cut: refused unless the cut may be split.
+      const Conversion refused = convert(in, false, {});
+      CHECK(refused.verdict == Verdict::refused);
+      CHECK(std::any_of(refused.diagnostics.begin(), refused.diagnostics.end(),
+                        [](const Diagnostic& d) { return d.code == "KN103"; }));
+      in.machine.links.rewind_in_cut = true;
+    }
+    const Conversion c = convert(in, false, {});
+    INFO(to);
+    for (const auto& d : c.diagnostics) UNSCOPED_INFO(to_string(d));
+    CHECK(c.verdict == Verdict::certified);
+    CHECK(c.blocks > 34000);
+  }
 }
