@@ -111,7 +111,6 @@ class Emitter {
     for (const auto& line : program_.title) put_line("; " + plain_text(line, kMaxComment));
     for (const auto& line : machine_.dialect.start) put_line(line);
     put_line("; speed of links on a straight line, m/s");
-    put_line("SP_LINK=" + decimal(kLinkSpeed, 3));
     put_line("$ADVANCE=3");
     modal_words();
     if (!program_.certified) put_line("HALT");
@@ -123,6 +122,7 @@ class Emitter {
     put_line("$TOOL={" +
              pose_text(tool_frame(machine_, program_.tool_length), machine_.dialect.digits_length) +
              "}");
+    put_line("SP_LINK=" + decimal(kLinkSpeed, 3));
     put_line("$IPO_MODE=#BASE");
     put_line("$ORI_TYPE=#VAR");
     if (blends()) {

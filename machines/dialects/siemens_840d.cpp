@@ -235,10 +235,17 @@ class Emitter {
     forget_words();
   }
 
-  // "CUT 7, input line 12" becomes the label CUT_7.
+  // "CUT 7 from input line 12" becomes the label CUT_7, "PATH from ..." PATH.
+  static std::string first_words(const std::string& text) {
+    const auto first = text.find(' ');
+    const bool number = first != std::string::npos && first + 1 < text.size() &&
+                        text[first + 1] >= '0' && text[first + 1] <= '9';
+    return text.substr(0, number ? text.find(' ', first + 1) : first);
+  }
+
   void print_label(const std::string& text) {
     std::string label;
-    for (const char c : plain_text(text.substr(0, text.find(',')), kMaxLabel - 6)) {
+    for (const char c : plain_text(first_words(text), kMaxLabel - 6)) {
       const bool letter = (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z');
       const bool digit = c >= '0' && c <= '9';
       label += letter || digit ? c : '_';

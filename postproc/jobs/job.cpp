@@ -77,8 +77,7 @@ class Run {
     const auto tools = read_tools(options_.tool);
     add(tools.diagnostics());
     if (!tools.ok()) return finish();
-    if (!tools.value().lengths.empty())
-      in.tool_length = tools.value().lengths.begin()->second;
+    if (!tools.value().lengths.empty()) in.tool_length = tools.value().lengths.begin()->second;
     in.text = std::move(input_bytes_);
     if (!options_.against.empty() && !read_against(in)) return finish();
     in.file_name = input_name_;
@@ -216,7 +215,7 @@ class Run {
     settings.integer_unit = read_number(options_.integer_unit);
     if (settings.integer_unit && (*settings.integer_unit == 1.0 || *settings.integer_unit == 0.001))
       return true;
-    add(usage_error("US150", "--integer-unit " + options_.integer_unit +
+    add(usage_error("US159", "--integer-unit " + options_.integer_unit +
                                  ": expected is 1 (X10 is 10 mm) or 0.001 (X10 is 0.010 mm)"));
     return false;
   }

@@ -18,9 +18,12 @@ class Follower {
       : inverse_(inverse), settings_(settings) {}
 
   Result<ControllerMotion> run(ReadBack read) {
-    out_.steps = read;
-    out_.steps->moves.clear();
-    out_.steps->events.clear();
+    std::vector<ReadBackMove> moves = std::move(read.moves);
+    std::vector<ReadBackEvent> events = std::move(read.events);
+    out_.steps = read;  // everything else
+    read.moves = std::move(moves);
+    read.events = std::move(events);
+    out_.steps->moves.reserve(read.moves.size() + read.moves.size() / 2);
     const JointMask all = (1U << inverse_.chain().size()) - 1U;
     JointMask known = 0;
     std::size_t event = 0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "kernels/core/units.h"
@@ -172,7 +173,8 @@ void describe_input(const ToolPath& path, const std::vector<Cut>& cuts,
   for (const Cut& cut : cuts) {
     if (cut.omitted) continue;
     CutSummary summary;
-    summary.label = "CUT " + std::to_string(cut.number) + (cut.after_rewind ? " continued" : "");
+    summary.label =
+        "CUT " + std::to_string(cut.number) + (cut.after_rewind ? " goes on after a rewind" : "");
     summary.first_line = path.points[cut.first].line;
     summary.last_line = path.points[cut.last].line;
     for (std::uint32_t k = cut.first; k <= cut.last; ++k) {
@@ -183,7 +185,11 @@ void describe_input(const ToolPath& path, const std::vector<Cut>& cuts,
     out.cuts.push_back(std::move(summary));
   }
   bool in_link = false;
+  std::vector<bool> omitted(path.points.size(), false);
+  for (const Cut& cut : cuts)
+    for (std::uint32_t k = cut.first; cut.omitted && k <= cut.last; ++k) omitted[k] = true;
   for (std::size_t k = 1; k < path.points.size(); ++k) {
+    if (omitted[k]) continue;
     out.programmed_time += path.points[k].duration;
     out.length += reference.length(k);
     if (!in_cut[k] && !in_link) ++out.links;
@@ -247,7 +253,8 @@ class Converter {
         watch_(out_.stages),
         path_(in.input.path),
         cuts_(find_cuts(path_, {in.keep_links, in.machine.links.micro_joint, in.cuts})),
-        reference_(path_, in.input.frames) {}
+        reference_(path_, in.input.frames),
+        wanted_states_(wanted_states(in)) {}
 
   Conversion run() {
     out_.reference = in_.input.reference;
@@ -420,9 +427,37 @@ class Converter {
       out_.diagnostics.back().severity = Severity::warning;
     }
     program_.part = chain_.workpiece_home;
-    program_.tool_length = path_.points.back().tool_length;
+    const auto first_cut =
+        std::find_if(program_.moves.begin(), program_.moves.end(),
+                     [](const MachineMove& m) { return m.role == MoveRole::path; });
+    if (first_cut != program_.moves.end()) program_.tool_length = first_cut->tool_length;
+    if (!tools_are_possible()) return false;
     program_.title = in_.title;
     program_.certified = true;
+    return true;
+  }
+
+  // A program that states its tool frame states one; one that leaves it to the control relies on
+  // it.
+  bool tools_are_possible() {
+    if (turn_ == ToolTurn::none) return true;
+    for (const MachineMove& move : program_.moves) {
+      if (move.role != MoveRole::path || move.tool_length == program_.tool_length) continue;
+      if (turn_ == ToolTurn::slerp) {
+        out_.diagnostics.push_back(diagnostic(
+            "PR311",
+            "tools of " + number(program_.tool_length) + " and " + number(move.tool_length) +
+                " mm: a program of this dialect has one tool frame in this version. Write "
+                "one program for each tool with --cuts",
+            in_.input_name, static_cast<int>(move.input_line)));
+        return false;
+      }
+      out_.assumes.push_back(
+          "the control has the lengths of all tools as the head of the program states them; its "
+          "guard "
+          "knows only the first");
+      return true;
+    }
     return true;
   }
 
@@ -512,9 +547,50 @@ class Converter {
     out_.checks.insert(out_.checks.end(), machine.checks.begin(), machine.checks.end());
     out_.axes = std::move(machine.axes);
     out_.scheduled_time = machine.scheduled_time;
+    out_.checks.push_back(process_check(motion.read));
     for (Check& c : out_.checks) give_input_line(c);
     watch_.lap("verify");
     return true;
+  }
+
+  // Spindle, coolant, gas ... at the start of every cut, from the text, against the whole input.
+  Check process_check(const ReadBack& read) const {
+    Check c;
+    c.name = "process_as_programmed";
+    c.unit = "cuts";
+    std::map<std::string, std::string> states;
+    std::size_t event = 0;
+    auto cut = cuts_.begin();
+    for (std::size_t i = 0; i < read.moves.size() && i < out_.line_map.size(); ++i) {
+      for (; event < read.events.size() && read.events[event].before <= i; ++event)
+        note_state(read.events[event].name, states);
+      if (out_.line_map[i].role != MoveRole::path) continue;
+      while (cut != cuts_.end() && (cut->omitted || cut->last < out_.line_map[i].segment)) ++cut;
+      if (cut == cuts_.end()) break;
+      if (out_.line_map[i].segment < cut->first) continue;
+      if (!cut->after_rewind && states != wanted_states_[static_cast<std::size_t>(cut->number)]) {
+        c.value += 1.0;
+        if (c.output_line == 0) c.output_line = read.moves[i].line;
+      }
+      ++cut;
+    }
+    c.ok = c.value == 0.0;
+    if (!c.ok)
+      c.note = "spindle, coolant, gas or power are not as the input has them when this cut starts";
+    return c;
+  }
+
+  // By cut number; only what the machine has words for.
+  static std::vector<std::map<std::string, std::string>> wanted_states(const ConvertInput& in) {
+    ToolPath whole = in.input.path;
+    const auto cuts = find_cuts(whole, {in.keep_links, in.machine.links.micro_joint, {}});
+    std::vector<std::map<std::string, std::string>> wanted(cuts.size() + 1);
+    for (const Cut& cut : cuts) {
+      auto& states = wanted[static_cast<std::size_t>(cut.number)];
+      states = states_at(in.input.path.events, cut.first - 1);
+      std::erase_if(states, [&in](const auto& s) { return !in.machine.has_event(s.second); });
+    }
+    return wanted;
   }
 
   void give_input_line(Check& check) const {
@@ -579,6 +655,7 @@ class Converter {
   ReferencePath reference_;
   ScrewChain chain_;
   MachineProgram program_;
+  std::vector<std::map<std::string, std::string>> wanted_states_;
   std::vector<std::uint32_t> split_lines_;
   std::optional<PartCheck> part_;
   std::optional<Inverse> inverse_;

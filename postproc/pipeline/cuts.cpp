@@ -157,8 +157,14 @@ class Partition {
       for (const std::size_t i : last) kept.push_back(path_.events[i]);
       state.clear();
     };
+    std::vector<std::size_t> chosen(left_out.size() + 1, 0);  // chosen points before each point
+    for (std::size_t k = 0; k < left_out.size(); ++k) chosen[k + 1] = chosen[k] + !left_out[k];
+    std::size_t last_point = 0;
     for (std::size_t i = 0; i < path_.events.size(); ++i) {
       PathEvent& e = path_.events[i];
+      // A chosen cut in between, with or without events of its own, needs the states before it.
+      if (chosen[e.point] != chosen[last_point]) flush();
+      last_point = e.point;
       if (!left_out[e.point]) {
         flush();
         kept.push_back(std::move(e));
@@ -267,6 +273,25 @@ CutPhases phases_of(const ReferencePath& reference, const Cut& cut) {
                                    .norm() <= kRetrace;
   (retraces ? phases.over_burn : phases.lead_out) = rest;
   return phases;
+}
+
+std::map<std::string, std::string> states_at(const std::vector<PathEvent>& events,
+                                             std::size_t point) {
+  std::map<std::string, std::string> states;
+  for (const PathEvent& e : events) {
+    if (e.point > point) break;
+    if (e.kind == PathEvent::Kind::process) note_state(e.event.name, states);
+  }
+  return states;
+}
+
+void note_state(const std::string& event, std::map<std::string, std::string>& states) {
+  const std::string group = state_group(event);
+  if (group.empty()) return;
+  if (ends_state(event))
+    states.erase(group);
+  else
+    states[group] = event;
 }
 
 std::string state_group(const std::string& event) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -69,5 +70,11 @@ CutPhases phases_of(const ReferencePath& reference, const Cut& cut);
 std::string state_group(const std::string& event);
 /// The event ends its group's state: spindle_off.
 bool ends_state(const std::string& event);
+/// Takes `event` into the states that are on: group -> event.
+void note_state(const std::string& event, std::map<std::string, std::string>& states);
+/// The states that are on when the path has reached `point` and its events have happened.
+/// @pre events sorted by point
+std::map<std::string, std::string> states_at(const std::vector<PathEvent>& events,
+                                             std::size_t point);
 
 }  // namespace smoothpost

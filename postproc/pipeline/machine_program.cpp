@@ -72,8 +72,9 @@ class Builder {
     const double tool_length = link_end(begin).tool_length;
     if (end > begin + 1) label(samples_[begin + 1].segment);
     append(link.approach, tool_length, 0, link.retracted);
-    restate(start_point);
+    const std::vector<PathEvent> restated = states_to_restate(start_point);
     emit_until(start_point);
+    for (const PathEvent& event : restated) emit(event);
     append(link.approach, tool_length, link.retracted);
     emit_at(start_point, true);
     for (std::size_t i = begin + 1; i < end; ++i) {
@@ -133,18 +134,21 @@ class Builder {
     return false;
   }
 
-  // States that are on and that no event of this link sets anew.
-  void restate(std::size_t start_point) {
+  // States that are on and that no event of this link sets anew, in the order they came on.
+  std::vector<PathEvent> states_to_restate(std::size_t start_point) const {
     std::vector<std::string> set_here;
     const auto& events = in_.path.events;
     for (std::size_t i = next_event_; i < events.size() && events[i].point <= start_point; ++i)
       if (events[i].kind == PathEvent::Kind::process)
         set_here.push_back(state_group(events[i].event.name));
-    for (const auto& [group, event] : states_) {
-      if (group == "tool" || std::find(set_here.begin(), set_here.end(), group) != set_here.end())
-        continue;
-      emit(event);
-    }
+    std::vector<PathEvent> restated;
+    for (const auto& [group, event] : states_)
+      if (group != "tool" && std::find(set_here.begin(), set_here.end(), group) == set_here.end())
+        restated.push_back(event);
+    std::stable_sort(restated.begin(), restated.end(), [](const PathEvent& a, const PathEvent& b) {
+      return a.point != b.point ? a.point < b.point : a.line < b.line;
+    });
+    return restated;
   }
 
   // Events before `point`, and those at it that stand before the run's start in the input.

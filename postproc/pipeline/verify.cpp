@@ -495,8 +495,7 @@ class DeviationCheck {
       std::vector<LinkEnd> waypoints;
       for (std::size_t k = i + 1; k + 1 < end; ++k)
         waypoints.push_back({read_.moves[k].to, in_.planned.moves[k].tool_length});
-      const double height =
-          unknown ? -INFINITY : proven_height(in_.chain, waypoints, *in_.part);
+      const double height = unknown ? -INFINITY : proven_height(in_.chain, waypoints, *in_.part);
       if (height >= least) continue;
       least = height;
       line = read_.moves[i + 1].line;

@@ -285,13 +285,13 @@ TEST_CASE("siemens_840d: labels are unique and restate the modal words", "[machi
   const auto machine = shipped_machine("head_table_bc");
   auto program = random_program(machine, rng, 12, true);
   using Kind = MachineAction::Kind;
-  program.actions = {action(Kind::cut_label, 2, "CUT 7, input line 12"),
-                     action(Kind::cut_label, 4, "PATH, input line 20"),
-                     action(Kind::cut_label, 6, "PATH, input line 30"),
-                     action(Kind::cut_label, 8, "CUT 8 goes on after a rewind, input line 31")};
+  program.actions = {action(Kind::cut_label, 2, "CUT 7 from input line 12"),
+                     action(Kind::cut_label, 4, "PATH from input line 20"),
+                     action(Kind::cut_label, 6, "PATH from input line 30"),
+                     action(Kind::cut_label, 8, "CUT 7 goes on after a rewind from input line 31")};
   const auto text = emitted_text(machine, program);
-  for (const char* label : {" CUT_7: ; CUT 7, input line 12\n",
-                            " PATH: ", " PATH_2: ", " CUT_8_GOES_ON_AFTER_A_REWI: "})
+  for (const char* label :
+       {" CUT_7: ; CUT 7 from input line 12\n", " PATH: ", " PATH_2: ", " CUT_7_2: "})
     CHECK(text.find(label) != std::string::npos);
   const auto at = text.find("CUT_7:");
   CHECK(text.find("G17 G710 G90 G94 G40 G60 G601 RTLION", at) != std::string::npos);

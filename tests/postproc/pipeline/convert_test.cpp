@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <map>
 #include <random>
 
 #include "kernels/core/units.h"
@@ -539,4 +540,32 @@ TEST_CASE("trajectory_csv: joints and tip at the cycle, linear in the printed ti
     at_line = end + 1;
   }
   CHECK(in_cut > 240);
+}
+
+TEST_CASE("convert: chosen cuts run with the spindle and coolant of the whole program",
+          "[postproc][pipeline]") {
+  const std::string program =
+      "%\nG21 G90 G94 G54\nT1 M6\nM3 S2000\nM8\nG0 X0 Y0 Z20\nG1 X10 F500\nG0 Z50\nG0 X20 Z20\n"
+      "G1 X30\nG0 Z50\nG0 X40 Z20\nG1 X50\nM9\nG0 Z50\nG0 X60 Z20\nG1 X70\nG0 Z50\nM5\nM30\n%\n";
+  for (int cut = 1; cut <= 4; ++cut) {
+    auto in = prepare(program, "table_table_ac", "table_table_bc");
+    in.cuts = CutRange{cut, cut};
+    const Conversion c = convert(in, false, {});
+    INFO("cut " << cut);
+    for (const auto& d : c.diagnostics) UNSCOPED_INFO(to_string(d));
+    REQUIRE(c.verdict == Verdict::certified);
+    CHECK(find(c, "process_as_programmed").ok);
+    std::map<std::string, std::string> states;
+    std::size_t cutting = 0;
+    while (c.line_map[cutting].role != MoveRole::path) ++cutting;
+    for (const auto& e : c.read.events)
+      if (e.before <= cutting) note_state(e.name, states);
+    CHECK(states.count("spindle") == 1);
+    CHECK(states.count("coolant") == (cut < 4 ? 1U : 0U));
+    CHECK(states.count("tool") == 1);
+    // At the end everything is off.
+    for (const auto& e : c.read.events) note_state(e.name, states);
+    CHECK(states.count("spindle") == 0);
+    CHECK(states.count("coolant") == 0);
+  }
 }

@@ -119,8 +119,8 @@ TEST_CASE("corpus: both boat programs on a robot, a head-table machine and an of
       }
       // A laser has no words for a mill's spindle: refused by name, with the input's line.
       CHECK(c.verdict == Verdict::refused);
-      const auto spindle = std::find_if(
-          c.diagnostics.begin(), c.diagnostics.end(), [](const Diagnostic& d) {
+      const auto spindle =
+          std::find_if(c.diagnostics.begin(), c.diagnostics.end(), [](const Diagnostic& d) {
             return d.code == "PR201" && d.text.find("spindle_on") != std::string::npos;
           });
       REQUIRE(spindle != c.diagnostics.end());
@@ -166,9 +166,8 @@ TEST_CASE("corpus: a SINUMERIK program with TRAORI and frames", "[postproc][pipe
     in.machine = shipped_machine("table_table_bc");
     const Conversion c = convert(in, false, {});
     CHECK(c.verdict == Verdict::refused);
-    CHECK(std::any_of(c.diagnostics.begin(), c.diagnostics.end(), [](const Diagnostic& d) {
-      return d.code == "PR112" && d.where.line > 0;
-    }));
+    CHECK(std::any_of(c.diagnostics.begin(), c.diagnostics.end(),
+                      [](const Diagnostic& d) { return d.code == "PR112" && d.where.line > 0; }));
   }
   settings.tool_numbers = {{"PLAN_D50_N_AP4", 1},
                            {"SCHAFT_D12_N_AP30", 2},
