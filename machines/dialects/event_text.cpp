@@ -55,6 +55,8 @@ std::optional<EventText> event_text(const MachineDefinition& machine, const Mach
     value = plain_text(value, kMaxValue);
     std::replace(value.begin(), value.end(), '"', '\'');
     std::replace(value.begin(), value.end(), ';', ',');
+    std::replace(value.begin(), value.end(), '(', '[');
+    std::replace(value.begin(), value.end(), ')', ']');
   }
   auto text = nc::render_event(*row, values);
   if (!text.ok()) {

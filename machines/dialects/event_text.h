@@ -20,8 +20,9 @@ struct EventText {
 };
 
 /// The row of [process.events] for the action's event with its values filled in. Values come from
-/// the input program: quotes and characters outside printable ASCII in them are replaced, so that a
-/// value stays a value. Nothing, with PR201 (or PR110, PR111), when there are no words.
+/// the input program: quotes, semicolons, parentheses and characters outside printable ASCII in
+/// them are replaced, so that a value stays a value and never ends the comment or the text it
+/// stands in. Nothing, with PR201 (or PR110, PR111), when there are no words.
 std::optional<EventText> event_text(const MachineDefinition& machine, const MachineAction& action,
                                     Diagnostics& diagnostics);
 

@@ -4,11 +4,11 @@
 #include <array>
 #include <cmath>
 
-#include "formats/nc/event_words.h"
 #include "formats/nc/interpreter.h"
 #include "formats/nc/parser.h"
 #include "kernels/core/units.h"
 #include "machines/dialects/decimal.h"
+#include "machines/dialects/event_text.h"
 
 namespace smoothpost::linuxcnc {
 
@@ -170,43 +170,16 @@ class Emitter {
   }
 
   void print_event(const MachineAction& action) {
-    const auto row =
-        std::find_if(machine_.process.events.begin(), machine_.process.events.end(),
-                     [&](const EventWords& e) { return e.event == action.event.name; });
-    if (row == machine_.process.events.end()) return unmapped(action);
-    const auto text = nc::render_event(*row, action.event.parameters);
-    if (!text.ok()) {
-      for (auto d : text.diagnostics()) {
-        d.where.line = static_cast<int>(action.input_line);
-        diagnostics_.push_back(std::move(d));
-      }
-      return;
-    }
+    const auto event = event_text(machine_, action, diagnostics_);
+    if (!event) return;
+    if (event->is_comment) return put_line("(" + comment_text(event->text) + ")");
     number(action.input_line);
-    put_line(text.value());
-    if (row->dwell > 0.0) {
+    put_line(event->text);
+    if (event->dwell > 0.0) {
       out_.text += "G4 P";
-      append_decimal(out_.text, row->dwell, 4);
+      append_decimal(out_.text, event->dwell, 4);
       put_line("");
     }
-  }
-
-  void unmapped(const MachineAction& action) {
-    if (machine_.process.unmapped == UnmappedWords::comment) {
-      put_line("(" + comment_text("unmapped event: " + action.event.name) + ")");
-      return;
-    }
-    Diagnostic d;
-    d.code = "PR201";
-    d.where.line = static_cast<int>(action.input_line);
-    d.where.column = static_cast<int>(action.event.column);
-    std::string values;
-    for (const auto& [key, value] : action.event.parameters) values += " " + key + "=" + value;
-    d.text = "event " + action.event.name + values + " has no words on machine " + machine_.name +
-             ": its [process.events] has no row " + action.event.name +
-             ". Add the row if the machine can do it, choose another machine, or set "
-             "process.unmapped = \"comment\" to keep it as a comment";
-    diagnostics_.push_back(std::move(d));
   }
 
   void print_move(const MachineMove& move) {

@@ -186,3 +186,26 @@ TEST_CASE("linuxcnc: an uncertified program says so first and stops", "[machines
   CHECK(text.rfind("%\n(NOT CERTIFIED", 0) == 0);
   CHECK(text.find("\nM0\n") < text.find("G0 "));
 }
+
+TEST_CASE("linuxcnc: a value of the input never becomes a command", "[machines][dialects]") {
+  const auto machine = shipped_machine("table_table_bc");
+  for (const std::string text :
+       {"door open) M3 S9000 (", "a\nM3 S9000", "x; M3 S9000", "\"M3 S9000"}) {
+    MachineProgram program;
+    MachineMove move;
+    move.to = home_of(machine);
+    move.joints = (1U << machine.size()) - 1U;
+    move.rapid = true;
+    program.moves = {move};
+    MachineAction message;
+    message.event.name = "message";
+    message.event.parameters = {{"text", text}};
+    program.actions = {message};
+    const auto emitted = linuxcnc::emit(machine, program);
+    REQUIRE(emitted.ok());
+    const auto read = linuxcnc::read_back(machine, emitted.value().text, "p");
+    INFO(emitted.value().text);
+    REQUIRE(read.ok());
+    for (const auto& e : read.value().events) CHECK(e.name != "spindle_on");
+  }
+}
