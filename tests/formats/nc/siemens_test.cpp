@@ -11,7 +11,7 @@ Run siemens(const std::string& lines, nc::InterpreterSettings settings = mill_se
   return run(lines + "\nM30\n", settings, nc::InputDialect::siemens);
 }
 
-const CanonicalMotion& last(const Run& r) {
+CanonicalMotion last(const Run& r) {
   INFO(r.all_text());
   REQUIRE(r.ok);
   REQUIRE_FALSE(r.sink.motions.empty());
