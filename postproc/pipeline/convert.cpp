@@ -1,19 +1,15 @@
 #include "postproc/pipeline/convert.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <map>
 #include <set>
 
 #include "kernels/core/units.h"
-#include "kernels/geometry/part_registration.h"
-#include "kernels/geometry/triangle_tree.h"
 #include "postproc/pipeline/arm_plan.h"
-#include "postproc/pipeline/controller_motion.h"
+#include "postproc/pipeline/conversion_parts.h"
 #include "postproc/pipeline/joint_plan.h"
 #include "postproc/pipeline/machine_program.h"
-#include "postproc/pipeline/path_match.h"
 #include "postproc/pipeline/registry.h"
 #include "postproc/pipeline/rewind.h"
 
@@ -22,149 +18,6 @@ namespace smoothpost {
 namespace {
 
 constexpr int kMostSplitRounds = 30;
-constexpr double kStepShare = 0.02;  // of the tolerances, between a tool move and its joint steps
-
-class Stopwatch {
- public:
-  explicit Stopwatch(std::vector<StageTime>& stages) : stages_(stages) {}
-  void lap(const char* name) {
-    const auto now = std::chrono::steady_clock::now();
-    stages_.push_back({name, std::chrono::duration<double>(now - last_).count()});
-    last_ = now;
-  }
-
- private:
-  std::vector<StageTime>& stages_;
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
-
-void append(Diagnostics& to, const Diagnostics& from) {
-  to.insert(to.end(), from.begin(), from.end());
-}
-
-Diagnostic diagnostic(const char* code, std::string text, std::string file = {}, int line = 0) {
-  Diagnostic d;
-  d.code = code;
-  d.text = std::move(text);
-  d.where = {std::move(file), line, 0};
-  return d;
-}
-
-ScrewChain placed_chain(const MachineDefinition& machine, const Pose& placement) {
-  ScrewChain chain = chain_of(machine);
-  chain.workpiece_home = chain.workpiece_home * placement;
-  return chain;
-}
-
-RegistrationSettings registration_settings(const MachineDefinition& machine) {
-  RegistrationSettings s;
-  s.nominal_gap = machine.tool.gap;
-  s.allowed_gap_deviation = machine.tool.gap - machine.tool.min_gap;
-  return s;
-}
-
-Check registration_check(const PartRegistration& registration,
-                         const RegistrationSettings& settings) {
-  Check c;
-  c.name = "part_registration";
-  c.value = registration.gap.worst_deviation;
-  c.limit = settings.allowed_gap_deviation;
-  c.unit = "mm";
-  c.ok = registration.verdict == RegistrationVerdict::registered;
-  c.note = registration.sentence;
-  return c;
-}
-
-/// Where the input's path meets the part: before anything is planned, so that an inch file or a
-/// wrong zero is named as what it is.
-class PartCheck {
- public:
-  PartCheck(const TriangleMesh& part, const MachineDefinition& machine)
-      : settings_(registration_settings(machine)), tree_(build_triangle_tree(part)) {}
-
-  const Diagnostics& diagnostics() const { return tree_.diagnostics(); }
-  bool ok() const { return tree_.ok(); }
-
-  /// At every 2 mm of the beam-on path, at most 64 points a segment: a circle is one segment.
-  struct InputRegistration {
-    PartRegistration registration;
-    std::uint32_t worst_line = 0;  ///< input line of the worst gap
-  };
-  InputRegistration input(const ReferencePath& reference) const {
-    constexpr double kStep = 2.0;
-    std::vector<CutterLocation> points;
-    std::vector<std::uint32_t> lines;
-    for (std::size_t k = 1; k <= reference.segments(); ++k) {
-      if (!reference.path().points[k].beam) continue;
-      const int steps =
-          static_cast<int>(std::clamp(std::ceil(reference.length(k) / kStep), 1.0, 64.0));
-      for (int i = 1; i <= steps; ++i)
-        points.push_back(reference.at(k, static_cast<double>(i) / steps));
-      lines.resize(points.size(), reference.path().points[k].line);
-    }
-    InputRegistration out;
-    out.registration = register_part(points, tree_.value(), settings_);
-    out.worst_line = lines[out.registration.gap.worst];
-    return out;
-  }
-
-  const RegistrationSettings& settings() const { return settings_; }
-
-  Check output(const ReadBack& read, const ScrewChain& chain) const {
-    const GapStatistics gap = measure_gaps(beam_locations(read, chain), tree_.value(), settings_);
-    Check c;
-    c.name = "gap";
-    c.unit = "mm";
-    c.value = gap.worst_deviation;
-    c.limit = settings_.allowed_gap_deviation;
-    c.ok = c.value <= c.limit;
-    c.output_line = line_of(read, gap.worst);
-    return c;
-  }
-
- private:
-  // The block of the k-th beam location (see beam_locations).
-  static std::uint32_t line_of(const ReadBack& read, std::size_t k) {
-    std::size_t n = 0;
-    for (std::size_t i = 1; i < read.moves.size(); ++i) {
-      if (!read.moves[i].beam) continue;
-      n += read.moves[i - 1].beam ? 2 : 3;
-      if (k < n) return read.moves[i].line;
-    }
-    return 0;
-  }
-
-  RegistrationSettings settings_;
-  Result<TriangleTree> tree_;
-};
-
-/// Tool moves as seen in the part: where the text states its own frames (BASE, work offset, TOOL)
-/// with their printed digits, these count and not what we meant.
-void into_part(ReadBack& read, const MachineDefinition& machine, const Pose& part,
-               const std::function<double(std::size_t)>& tool_length) {
-  if (!read.part && !read.tool_frame) return;
-  const Pose base = read.part ? part.inverse() * *read.part : Pose::Identity();
-  for (std::size_t i = 0; i < read.moves.size(); ++i) {
-    ReadBackMove& move = read.moves[i];
-    if (move.interpolation != MoveInterpolation::tool) continue;
-    move.tool = base * move.tool;
-    if (!read.tool_frame) continue;
-    Pose tip = Pose::Identity();
-    tip.translation() = machine.tool.tip - tool_length(i) * machine.tool.axis;
-    move.tool = move.tool * read.tool_frame->inverse() * (machine.tool.flange.inverse() * tip);
-  }
-}
-
-Result<ControllerMotion> follow(ReadBack read, const MachineDefinition& machine,
-                                const Inverse& inverse, ToolTurn turn,
-                                const std::function<double(std::size_t)>& tool_length) {
-  FollowSettings settings;
-  settings.turn = turn;
-  settings.tip_tolerance = kStepShare * machine.tolerance.tip;
-  settings.axis_tolerance = kStepShare * machine.tolerance.axis;
-  settings.tool_length = tool_length;
-  return follow_controller(std::move(read), inverse, settings);
-}
 
 /// Fills what does not depend on how the program was made.
 void describe_input(const ToolPath& path, const std::vector<Cut>& cuts,
@@ -195,30 +48,6 @@ void describe_input(const ToolPath& path, const std::vector<Cut>& cuts,
     if (!in_cut[k] && !in_link) ++out.links;
     in_link = !in_cut[k];
   }
-}
-
-void describe_promises(const MachineDefinition& machine, bool has_part, Conversion& out) {
-  const double tip = machine.tolerance.tip;
-  const ToleranceBudget& share = machine.tolerance.budget;
-  out.budget_mm = {share.merge * tip, share.smoothing * tip, share.chord * tip,
-                   share.rounding * tip, share.controller * tip};
-  out.assumes.push_back(
-      "the machine is as its definition file says: axes, pivots and tool are calibrated");
-  if (const Dialect* dialect = find_dialect(machine.dialect.name))
-    if (machine.dialect.offset_guard) out.assumes.push_back(dialect->guard);
-  out.not_checked.push_back("clearance");
-  out.not_checked.push_back("acceleration_limit");
-  out.not_checked.push_back("jerk_limit");
-  if (!has_part) {
-    out.not_checked.push_back("part_registration");
-    out.not_checked.push_back("gap");
-  }
-  std::string assumed;
-  for (const auto& axis : machine.axes)
-    if (axis.source == LimitSource::assumed) assumed += (assumed.empty() ? "" : ", ") + axis.name;
-  if (!assumed.empty())
-    out.assumes.push_back(
-        "the limits of these axes are assumed, not from a datasheet, and used at 90 %: " + assumed);
 }
 
 }  // namespace
@@ -667,163 +496,6 @@ class Converter {
 
 Conversion convert(const ConvertInput& in, bool force, const Progress& progress) {
   return Converter(in, force, progress).run();
-}
-
-namespace {
-
-/// A program with the joints of its tool moves, as joint steps, and how far these may be from what
-/// the control does.
-struct FollowedProgram {
-  ReadBack read;
-  double tip_allowance = 0.0;   ///< mm
-  double axis_allowance = 0.0;  ///< rad
-};
-
-/// Over all tool moves, each from where the joints stand before it.
-double largest_turn_allowance(const ReadBack& read, const ScrewChain& chain, ToolTurn turn) {
-  double largest = 0.0;
-  for (std::size_t i = 1; i < read.moves.size(); ++i) {
-    if (read.moves[i].interpolation != MoveInterpolation::tool) continue;
-    const Pose from = tip_pose(chain, read.moves[i - 1].to, 0.0);  // its rotation is what counts
-    largest = std::max(largest, turn_allowance(from, read.moves[i].tool, turn));
-  }
-  return largest;
-}
-
-/// The shape of a program against its input, as checks. The matching bounds the larger of the two
-/// shares of the tolerances, so both deviations are told as that share of theirs.
-Checks shape_checks(const CheckInput& in, const FollowedProgram& program, const ScrewChain& chain,
-                    const Progress& progress) {
-  const ReadBack& read = program.read;
-  ToolPath path = in.against->path;
-  find_cuts(path, {false, in.machine.links.micro_joint, {}});
-  const ReferencePath reference(path, in.against->frames);
-  const auto& tolerance = in.machine.tolerance;
-  const bool beam = std::any_of(path.points.begin(), path.points.end(),
-                                [](const PathPoint& p) { return p.beam; });
-  const double tip = tolerance.tip - program.tip_allowance;
-  const double axis = tolerance.axis - program.axis_allowance;
-  PathMatch match;
-  match.reason =
-      "the blocks are too long for this axis tolerance: what the control does between "
-      "their ends is not known so closely";
-  if (tip > 0.0 && axis > 0.0)
-    match = match_paths(read, chain, reference, {tip, axis, beam}, progress);
-  const auto check = [&](const char* name, double limit, double allowance, const char* unit) {
-    Check c;
-    c.name = name;
-    c.limit = limit;
-    c.unit = unit;
-    c.ok = match.matched;
-    c.value = match.matched ? match.share * (limit - allowance) + allowance : INFINITY;
-    c.input_line = match.input_line;
-    c.output_line = match.output_line;
-    c.note = match.reason;
-    return c;
-  };
-  return {check("tip_deviation", tolerance.tip, program.tip_allowance, "mm"),
-          check("axis_deviation", degrees_from_radians(tolerance.axis),
-                degrees_from_radians(program.axis_allowance), "deg")};
-}
-
-/// Joints of tool moves; the tool's length is the one that the program's own tool frame has, or the
-/// one that the user gave.
-bool follow_program(const CheckInput& in, const ScrewChain& chain, const Dialect& dialect,
-                    FollowedProgram& program, Conversion& out) {
-  ReadBack& read = program.read;
-  const bool any = std::any_of(read.moves.begin(), read.moves.end(), [](const ReadBackMove& m) {
-    return m.interpolation == MoveInterpolation::tool;
-  });
-  const auto inverse = Inverse::from(chain);
-  if (!any || !inverse) {
-    if (any)
-      out.diagnostics.push_back(
-          diagnostic("KN110", "machine " + in.machine.name +
-                                  " has no closed form: its joints on tool moves "
-                                  "are not known in this version"));
-    return !any;
-  }
-  double length = in.tool_length;
-  if (read.tool_frame)
-    length = -in.machine.tool.axis.dot((in.machine.tool.flange * *read.tool_frame).translation() -
-                                       in.machine.tool.tip);
-  const auto tool_length = [length](std::size_t) { return length; };
-  into_part(read, in.machine, chain.workpiece_home, tool_length);
-  auto followed = follow(std::move(read), in.machine, *inverse, dialect.tool_turn, tool_length);
-  for (auto d : followed.diagnostics()) {
-    d.where.file = in.file_name;
-    out.diagnostics.push_back(std::move(d));
-  }
-  if (!followed.ok()) return false;
-  ControllerMotion& motion = followed.value();
-  program.tip_allowance = kStepShare * in.machine.tolerance.tip;
-  program.axis_allowance = kStepShare * in.machine.tolerance.axis +
-                           largest_turn_allowance(motion.read, chain, dialect.tool_turn);
-  read = motion.steps ? std::move(*motion.steps) : std::move(motion.read);
-  return true;
-}
-
-void tell_failed_checks(Conversion& out, const std::string& file) {
-  for (const Check& c : out.checks)
-    if (!c.ok)
-      out.diagnostics.push_back(diagnostic(
-          "CK101",
-          "check " + c.name +
-              " failed: " + (std::isfinite(c.value) ? std::to_string(c.value) : "no bound") + " " +
-              c.unit + ", limit " + std::to_string(c.limit) + " " + c.unit +
-              (c.input_line > 0 ? ", input line " + std::to_string(c.input_line) : "") +
-              (c.note.empty() ? "" : ". " + c.note),
-          file, static_cast<int>(c.output_line)));
-}
-
-}  // namespace
-
-Conversion check_program(const CheckInput& in, const Progress& progress) {
-  Conversion out;
-  Stopwatch watch(out.stages);
-  describe_promises(in.machine, in.part.has_value(), out);
-  if (!in.against) {
-    out.not_checked.push_back("tip_deviation");
-    out.not_checked.push_back("axis_deviation");
-  }
-  const Dialect* dialect = find_dialect(in.machine.dialect.name);
-  if (!dialect) {
-    out.diagnostics.push_back(diagnostic(
-        "US121", "no output dialect \"" + in.machine.dialect.name + "\" in this version"));
-    return out;
-  }
-  out.interpolation = dialect->interpolation;
-  auto read = dialect->read_back(in.machine, in.text, in.file_name);
-  append(out.diagnostics, read.diagnostics());
-  watch.lap("read back");
-  if (!read.ok()) return out;
-  const ScrewChain chain = placed_chain(in.machine, in.placement);
-  out.blocks = read.value().moves.size();
-  FollowedProgram program{std::move(read.value())};
-  if (!follow_program(in, chain, *dialect, program, out)) return out;
-  Verification machine = verify_machine(program.read, in.machine);
-  out.axes = std::move(machine.axes);
-  out.scheduled_time = machine.scheduled_time;
-  if (in.against) {
-    out.checks = shape_checks(in, program, chain, progress);
-    out.reference = in.against->reference;
-    out.assumes.insert(out.assumes.begin(), in.against->assumes.begin(), in.against->assumes.end());
-  }
-  out.checks.insert(out.checks.end(), machine.checks.begin(), machine.checks.end());
-  out.read = std::move(program.read);
-  if (in.part) {
-    const PartCheck part(*in.part, in.machine);
-    append(out.diagnostics, part.diagnostics());
-    if (part.ok() && !beam_locations(out.read, chain).empty())
-      out.checks.push_back(part.output(out.read, chain));
-  }
-  watch.lap("verify");
-  tell_failed_checks(out, in.file_name);
-  if (has_error(out.diagnostics))
-    out.verdict = Verdict::refused;
-  else
-    out.verdict = in.against ? Verdict::certified : Verdict::limits_only;
-  return out;
 }
 
 }  // namespace smoothpost

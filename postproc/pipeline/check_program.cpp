@@ -1,0 +1,168 @@
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/core/units.h"
+#include "postproc/pipeline/conversion_parts.h"
+#include "postproc/pipeline/path_match.h"
+#include "postproc/pipeline/registry.h"
+
+namespace smoothpost {
+
+namespace {
+
+/// A program with the joints of its tool moves, as joint steps, and how far these may be from what
+/// the control does.
+struct FollowedProgram {
+  ReadBack read;
+  double tip_allowance = 0.0;   ///< mm
+  double axis_allowance = 0.0;  ///< rad
+};
+
+/// Over all tool moves, each from where the joints stand before it.
+double largest_turn_allowance(const ReadBack& read, const ScrewChain& chain, ToolTurn turn) {
+  double largest = 0.0;
+  for (std::size_t i = 1; i < read.moves.size(); ++i) {
+    if (read.moves[i].interpolation != MoveInterpolation::tool) continue;
+    const Pose from = tip_pose(chain, read.moves[i - 1].to, 0.0);  // its rotation is what counts
+    largest = std::max(largest, turn_allowance(from, read.moves[i].tool, turn));
+  }
+  return largest;
+}
+
+/// The shape of a program against its input, as checks. The matching bounds the larger of the two
+/// shares of the tolerances, so both deviations are told as that share of theirs.
+Checks shape_checks(const CheckInput& in, const FollowedProgram& program, const ScrewChain& chain,
+                    const Progress& progress) {
+  const ReadBack& read = program.read;
+  ToolPath path = in.against->path;
+  find_cuts(path, {false, in.machine.links.micro_joint, {}});
+  const ReferencePath reference(path, in.against->frames);
+  const auto& tolerance = in.machine.tolerance;
+  const bool beam = std::any_of(path.points.begin(), path.points.end(),
+                                [](const PathPoint& p) { return p.beam; });
+  const double tip = tolerance.tip - program.tip_allowance;
+  const double axis = tolerance.axis - program.axis_allowance;
+  PathMatch match;
+  match.reason =
+      "the blocks are too long for this axis tolerance: what the control does between "
+      "their ends is not known so closely";
+  if (tip > 0.0 && axis > 0.0)
+    match = match_paths(read, chain, reference, {tip, axis, beam}, progress);
+  const auto check = [&](const char* name, double limit, double allowance, const char* unit) {
+    Check c;
+    c.name = name;
+    c.limit = limit;
+    c.unit = unit;
+    c.ok = match.matched;
+    c.value = match.matched ? match.share * (limit - allowance) + allowance : INFINITY;
+    c.input_line = match.input_line;
+    c.output_line = match.output_line;
+    c.note = match.reason;
+    return c;
+  };
+  return {check("tip_deviation", tolerance.tip, program.tip_allowance, "mm"),
+          check("axis_deviation", degrees_from_radians(tolerance.axis),
+                degrees_from_radians(program.axis_allowance), "deg")};
+}
+
+/// Joints of tool moves; the tool's length is the one that the program's own tool frame has, or the
+/// one that the user gave.
+bool follow_program(const CheckInput& in, const ScrewChain& chain, const Dialect& dialect,
+                    FollowedProgram& program, Conversion& out) {
+  ReadBack& read = program.read;
+  const bool any = std::any_of(read.moves.begin(), read.moves.end(), [](const ReadBackMove& m) {
+    return m.interpolation == MoveInterpolation::tool;
+  });
+  const auto inverse = Inverse::from(chain);
+  if (!any || !inverse) {
+    if (any)
+      out.diagnostics.push_back(
+          diagnostic("KN110", "machine " + in.machine.name +
+                                  " has no closed form: its joints on tool moves "
+                                  "are not known in this version"));
+    return !any;
+  }
+  double length = in.tool_length;
+  if (read.tool_frame)
+    length = -in.machine.tool.axis.dot((in.machine.tool.flange * *read.tool_frame).translation() -
+                                       in.machine.tool.tip);
+  const auto tool_length = [length](std::size_t) { return length; };
+  into_part(read, in.machine, chain.workpiece_home, tool_length);
+  auto followed = follow(std::move(read), in.machine, *inverse, dialect.tool_turn, tool_length);
+  for (auto d : followed.diagnostics()) {
+    d.where.file = in.file_name;
+    out.diagnostics.push_back(std::move(d));
+  }
+  if (!followed.ok()) return false;
+  ControllerMotion& motion = followed.value();
+  program.tip_allowance = kStepShare * in.machine.tolerance.tip;
+  program.axis_allowance = kStepShare * in.machine.tolerance.axis +
+                           largest_turn_allowance(motion.read, chain, dialect.tool_turn);
+  read = motion.steps ? std::move(*motion.steps) : std::move(motion.read);
+  return true;
+}
+
+void tell_failed_checks(Conversion& out, const std::string& file) {
+  for (const Check& c : out.checks)
+    if (!c.ok)
+      out.diagnostics.push_back(diagnostic(
+          "CK101",
+          "check " + c.name +
+              " failed: " + (std::isfinite(c.value) ? std::to_string(c.value) : "no bound") + " " +
+              c.unit + ", limit " + std::to_string(c.limit) + " " + c.unit +
+              (c.input_line > 0 ? ", input line " + std::to_string(c.input_line) : "") +
+              (c.note.empty() ? "" : ". " + c.note),
+          file, static_cast<int>(c.output_line)));
+}
+
+}  // namespace
+
+Conversion check_program(const CheckInput& in, const Progress& progress) {
+  Conversion out;
+  Stopwatch watch(out.stages);
+  describe_promises(in.machine, in.part.has_value(), out);
+  if (!in.against) {
+    out.not_checked.push_back("tip_deviation");
+    out.not_checked.push_back("axis_deviation");
+  }
+  const Dialect* dialect = find_dialect(in.machine.dialect.name);
+  if (!dialect) {
+    out.diagnostics.push_back(diagnostic(
+        "US121", "no output dialect \"" + in.machine.dialect.name + "\" in this version"));
+    return out;
+  }
+  out.interpolation = dialect->interpolation;
+  auto read = dialect->read_back(in.machine, in.text, in.file_name);
+  append(out.diagnostics, read.diagnostics());
+  watch.lap("read back");
+  if (!read.ok()) return out;
+  const ScrewChain chain = placed_chain(in.machine, in.placement);
+  out.blocks = read.value().moves.size();
+  FollowedProgram program{std::move(read.value())};
+  if (!follow_program(in, chain, *dialect, program, out)) return out;
+  Verification machine = verify_machine(program.read, in.machine);
+  out.axes = std::move(machine.axes);
+  out.scheduled_time = machine.scheduled_time;
+  if (in.against) {
+    out.checks = shape_checks(in, program, chain, progress);
+    out.reference = in.against->reference;
+    out.assumes.insert(out.assumes.begin(), in.against->assumes.begin(), in.against->assumes.end());
+  }
+  out.checks.insert(out.checks.end(), machine.checks.begin(), machine.checks.end());
+  out.read = std::move(program.read);
+  if (in.part) {
+    const PartCheck part(*in.part, in.machine);
+    append(out.diagnostics, part.diagnostics());
+    if (part.ok() && !beam_locations(out.read, chain).empty())
+      out.checks.push_back(part.output(out.read, chain));
+  }
+  watch.lap("verify");
+  tell_failed_checks(out, in.file_name);
+  if (has_error(out.diagnostics))
+    out.verdict = Verdict::refused;
+  else
+    out.verdict = in.against ? Verdict::certified : Verdict::limits_only;
+  return out;
+}
+
+}  // namespace smoothpost

@@ -1,0 +1,137 @@
+#include "postproc/pipeline/conversion_parts.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "postproc/pipeline/registry.h"
+
+namespace smoothpost {
+
+void append(Diagnostics& to, const Diagnostics& from) {
+  to.insert(to.end(), from.begin(), from.end());
+}
+
+Diagnostic diagnostic(const char* code, std::string text, std::string file, int line) {
+  Diagnostic d;
+  d.code = code;
+  d.text = std::move(text);
+  d.where = {std::move(file), line, 0};
+  return d;
+}
+
+ScrewChain placed_chain(const MachineDefinition& machine, const Pose& placement) {
+  ScrewChain chain = chain_of(machine);
+  chain.workpiece_home = chain.workpiece_home * placement;
+  return chain;
+}
+
+RegistrationSettings registration_settings(const MachineDefinition& machine) {
+  RegistrationSettings s;
+  s.nominal_gap = machine.tool.gap;
+  s.allowed_gap_deviation = machine.tool.gap - machine.tool.min_gap;
+  return s;
+}
+
+Check registration_check(const PartRegistration& registration,
+                         const RegistrationSettings& settings) {
+  Check c;
+  c.name = "part_registration";
+  c.value = registration.gap.worst_deviation;
+  c.limit = settings.allowed_gap_deviation;
+  c.unit = "mm";
+  c.ok = registration.verdict == RegistrationVerdict::registered;
+  c.note = registration.sentence;
+  return c;
+}
+
+void into_part(ReadBack& read, const MachineDefinition& machine, const Pose& part,
+               const std::function<double(std::size_t)>& tool_length) {
+  if (!read.part && !read.tool_frame) return;
+  const Pose base = read.part ? part.inverse() * *read.part : Pose::Identity();
+  for (std::size_t i = 0; i < read.moves.size(); ++i) {
+    ReadBackMove& move = read.moves[i];
+    if (move.interpolation != MoveInterpolation::tool) continue;
+    move.tool = base * move.tool;
+    if (!read.tool_frame) continue;
+    Pose tip = Pose::Identity();
+    tip.translation() = machine.tool.tip - tool_length(i) * machine.tool.axis;
+    move.tool = move.tool * read.tool_frame->inverse() * (machine.tool.flange.inverse() * tip);
+  }
+}
+
+Result<ControllerMotion> follow(ReadBack read, const MachineDefinition& machine,
+                                const Inverse& inverse, ToolTurn turn,
+                                const std::function<double(std::size_t)>& tool_length) {
+  FollowSettings settings;
+  settings.turn = turn;
+  settings.tip_tolerance = kStepShare * machine.tolerance.tip;
+  settings.axis_tolerance = kStepShare * machine.tolerance.axis;
+  settings.tool_length = tool_length;
+  return follow_controller(std::move(read), inverse, settings);
+}
+
+void describe_promises(const MachineDefinition& machine, bool has_part, Conversion& out) {
+  const double tip = machine.tolerance.tip;
+  const ToleranceBudget& share = machine.tolerance.budget;
+  out.budget_mm = {share.merge * tip, share.smoothing * tip, share.chord * tip,
+                   share.rounding * tip, share.controller * tip};
+  out.assumes.push_back(
+      "the machine is as its definition file says: axes, pivots and tool are calibrated");
+  if (const Dialect* dialect = find_dialect(machine.dialect.name))
+    if (machine.dialect.offset_guard) out.assumes.push_back(dialect->guard);
+  out.not_checked.push_back("clearance");
+  out.not_checked.push_back("acceleration_limit");
+  out.not_checked.push_back("jerk_limit");
+  if (!has_part) {
+    out.not_checked.push_back("part_registration");
+    out.not_checked.push_back("gap");
+  }
+  std::string assumed;
+  for (const auto& axis : machine.axes)
+    if (axis.source == LimitSource::assumed) assumed += (assumed.empty() ? "" : ", ") + axis.name;
+  if (!assumed.empty())
+    out.assumes.push_back(
+        "the limits of these axes are assumed, not from a datasheet, and used at 90 %: " + assumed);
+}
+
+PartCheck::InputRegistration PartCheck::input(const ReferencePath& reference) const {
+  constexpr double kStep = 2.0;
+  std::vector<CutterLocation> points;
+  std::vector<std::uint32_t> lines;
+  for (std::size_t k = 1; k <= reference.segments(); ++k) {
+    if (!reference.path().points[k].beam) continue;
+    const int steps =
+        static_cast<int>(std::clamp(std::ceil(reference.length(k) / kStep), 1.0, 64.0));
+    for (int i = 1; i <= steps; ++i)
+      points.push_back(reference.at(k, static_cast<double>(i) / steps));
+    lines.resize(points.size(), reference.path().points[k].line);
+  }
+  InputRegistration out;
+  out.registration = register_part(points, tree_.value(), settings_);
+  out.worst_line = lines[out.registration.gap.worst];
+  return out;
+}
+
+Check PartCheck::output(const ReadBack& read, const ScrewChain& chain) const {
+  const GapStatistics gap = measure_gaps(beam_locations(read, chain), tree_.value(), settings_);
+  Check c;
+  c.name = "gap";
+  c.unit = "mm";
+  c.value = gap.worst_deviation;
+  c.limit = settings_.allowed_gap_deviation;
+  c.ok = c.value <= c.limit;
+  c.output_line = line_of(read, gap.worst);
+  return c;
+}
+
+std::uint32_t PartCheck::line_of(const ReadBack& read, std::size_t k) {
+  std::size_t n = 0;
+  for (std::size_t i = 1; i < read.moves.size(); ++i) {
+    if (!read.moves[i].beam) continue;
+    n += read.moves[i - 1].beam ? 2 : 3;
+    if (k < n) return read.moves[i].line;
+  }
+  return 0;
+}
+
+}  // namespace smoothpost
