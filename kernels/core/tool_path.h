@@ -25,6 +25,8 @@ enum class PathInterpolation : std::uint8_t {
 /// The pose at the end of one motion, where it came from, and how it is to be reached.
 struct PathPoint {
   CutterLocation location;
+  Eigen::Quaterniond rotation =
+      Eigen::Quaterniond::Identity();   ///< of the tool frame, its Z along the axis; full_pose only
   MotionKind kind = MotionKind::rapid;  ///< of the segment that ends here; the first point has none
   PathInterpolation interpolation = PathInterpolation::great_circle;
   bool is_arc = false;
@@ -59,6 +61,7 @@ struct ToolPath {
   std::vector<PathPoint> points;
   std::vector<ArcGeometry> arcs;  ///< in the coordinates of `words`
   std::vector<PathEvent> events;  ///< sorted by point, program order within a point
+  bool full_pose = false;         ///< the input gives whole rotations, not only tool axes
 };
 
 }  // namespace smoothpost

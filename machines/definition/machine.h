@@ -27,6 +27,13 @@ struct AxisDefinition {
   LimitSource source = LimitSource::assumed;
 };
 
+/// What hangs on the flange, for a controller's own dynamics.
+struct LoadData {
+  double mass = 0.0;            ///< kg
+  Vec3 centre = Vec3::Zero();   ///< of gravity, in the flange frame, mm
+  Vec3 inertia = Vec3::Zero();  ///< about the centre, axes of the flange frame, kg·m²
+};
+
 struct ToolDefinition {
   Vec3 tip = Vec3::Zero();         ///< in the last link, mm; where a tool of length 0 has its tip
   Vec3 axis = Vec3::UnitZ();       ///< unit, from tip to holder
@@ -35,6 +42,7 @@ struct ToolDefinition {
   double gap = 0.0;                ///< nominal distance tip to part while the beam is on, mm
   double land_radius = 0.0;
   double min_gap = 0.0;
+  std::optional<LoadData> load;  ///< for controllers that state it; no default
 };
 
 struct WorkpieceDefinition {
@@ -92,13 +100,18 @@ struct ToleranceSettings {
 struct RecipeSettings {
   std::string kind = "five_axis";  ///< robot | laser | finishing | five_axis
   std::string smoothing = "none";
-  std::string shape = "half";
+  std::string shape = "half";  ///< of acr: half (kappa, lambda below) | paper (Eq. (37) per corner)
+  double kappa = 0.5;
+  double lambda = 0.5;
+  std::optional<double> ramp_c1;  ///< of ramp; nothing: by the turning angle
+  std::string task = "axis";      ///< axis (rotation about the tool is free) | pose
   std::string orientation = "programmed";
   std::string optimise = "none";
   std::string solver = "hybrid";
   std::string schedule = "programmed";
   int knot_every = 4;
-  std::optional<double> spin;  ///< rad, arms: rotation about the tool axis; nothing: chosen
+  std::string spin_policy = "fixed";  ///< arms, task axis: fixed | tangent | optimised
+  std::optional<double> spin;         ///< rad, arms: rotation about the tool axis; nothing: chosen
 };
 
 struct DialectSettings {
@@ -113,7 +126,7 @@ struct DialectSettings {
   std::vector<std::string> start;
   std::vector<std::string> end;
   bool offset_guard = true;
-  std::string path_mode = "exact";  ///< exact | blend
+  std::string path_mode = "exact";  ///< exact | blend | spline
 };
 
 /// Tip speed (mm/s) to power (percent), monotone; empty when the machine has no beam power.

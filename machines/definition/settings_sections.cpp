@@ -255,6 +255,24 @@ RecipeSettings read_recipe(TableReader reader) {
   choose("solver", {"hybrid", "ipopt", "banded"}, recipe.solver);
   choose("schedule", {"jerk", "constant", "programmed"}, recipe.schedule);
   recipe.knot_every = reader.integer("knot_every", 1, 1000000).value_or(recipe.knot_every);
+  const auto share = [&](std::string_view key, double fallback) {
+    const double value = reader.number_or(key, fallback, Bound::not_negative);
+    if (value > 3.0)
+      reader.error("MF108", std::string(key) + " is " + to_text(value) + " and has to be at most 3",
+                   key);
+    return value;
+  };
+  recipe.kappa = share("kappa", recipe.kappa);
+  recipe.lambda = share("lambda", recipe.lambda);
+  if (const auto c1 = reader.number("ramp_c1")) {
+    recipe.ramp_c1 = *c1;
+    if (*c1 < -1.09 || *c1 > 6.56)
+      reader.error("MF108",
+                   "ramp_c1 is " + to_text(*c1) + " and has to lie between -1.09 and 6.56 (convex)",
+                   "ramp_c1");
+  }
+  choose("task", {"axis", "pose"}, recipe.task);
+  choose("spin", {"fixed", "tangent", "optimised"}, recipe.spin_policy);
   if (const auto spin = reader.number("spin_deg")) recipe.spin = *spin * kRadiansPerDegree;
   reader.finish();
   return recipe;
@@ -300,7 +318,8 @@ DialectSettings read_dialect(TableReader reader, const CycleSettings& cycle) {
   dialect.start = reader.lines("start").value_or(dialect.start);
   dialect.end = reader.lines("end").value_or(dialect.end);
   dialect.offset_guard = reader.boolean("offset_guard").value_or(dialect.offset_guard);
-  dialect.path_mode = reader.choice("path_mode", {"exact", "blend"}).value_or(dialect.path_mode);
+  dialect.path_mode =
+      reader.choice("path_mode", {"exact", "blend", "spline"}).value_or(dialect.path_mode);
   reader.finish();
   return dialect;
 }

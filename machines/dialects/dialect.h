@@ -41,8 +41,14 @@ struct MachineMove {
   bool machine_coordinates = false;  ///< joint words that are valid whatever offsets are live (G53)
   std::uint32_t input_line = 0;
   std::uint32_t segment = 0;  ///< role path: segment of the ToolPath (1 = from point 0 to point 1)
-  double from_share = 0.0;    ///< role path: the part of that segment, shares in [0, 1]
-  double to_share = 1.0;
+  std::uint32_t from_segment = 0;  ///< role path: where the move starts; below segment when points
+                                   ///< between were merged
+  double from_share = 0.0;         ///< role path: share of from_segment, in [0, 1]
+  double to_share = 1.0;           ///< role path: share of segment
+  double blend = 0.0;              ///< mm: the control may round the corner at the end of this move
+                                   ///< within this distance of it; 0: exact
+  bool spline = false;  ///< interpolation tool: one of a chain of moves whose ends the control
+                        ///< joins by a smooth curve of its own
   double duration = 0.0;     ///< s; 0 for a rapid
   double tool_length = 0.0;  ///< mm, of the tool in the holder
 };
@@ -88,6 +94,8 @@ struct ReadBackMove {
                                  ///< joints that the block names (external axes)
   bool rapid = false;
   bool beam = false;      ///< beam on while it moves
+  double blend = 0.0;     ///< mm, as MachineMove::blend
+  bool spline = false;    ///< as MachineMove::spline
   double duration = 0.0;  ///< s, from F; 0 for a rapid
   std::uint32_t line = 0;
 };
@@ -104,7 +112,7 @@ struct ReadBack {
   std::vector<ReadBackMove> moves;
   std::vector<ReadBackEvent> events;
   bool offset_guard = false;  ///< the text holds the guard of emit(), unchanged
-  bool exact_path = false;    ///< the controller is told not to blend
+  bool exact_path = false;    ///< the controller is told not to blend, or blends by a known bound
   std::uint32_t line_count = 0;
   std::uint32_t last_line = 0;
   std::optional<Pose> part;        ///< X_MW that the text itself sets or demands
