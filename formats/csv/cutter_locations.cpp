@@ -196,7 +196,7 @@ class Reader {
     const std::size_t before = errors_;
     PathPoint point;
     point.location.tip = {number(kX), number(kY), number(kZ)};
-    point.location.axis = axis();
+    orient(point);
     point.line = line_number();
     const double feed = field(kFeed).text.empty() ? 0.0 : number(kFeed);
     if (feed < 0.0)
@@ -244,6 +244,7 @@ class Reader {
                         "reading stops after " + std::to_string(kMaxErrors) + " errors",
                         {file_, number_, 0}});
     if (errors_ > 0) return;
+    path_.full_pose = orientation_ != kI;
     if (path_.points.empty()) {
       complain("CSV114", {}, "no row after the header");
       return;
@@ -287,20 +288,24 @@ class Reader {
     return value;
   }
 
-  Vec3 axis() {
+  void orient(PathPoint& point) {
     if (orientation_ == kI) {
       const Vec3 written{number(kI), number(kJ), number(kK)};
-      return written / checked_length(written.norm());
+      point.location.axis = written / checked_length(written.norm());
+      return;
     }
+    point.interpolation = PathInterpolation::slerp;
     if (orientation_ == kQw) {
       Eigen::Quaterniond q{number(kQw), number(kQx), number(kQy), number(kQz)};
       q.coeffs() /= checked_length(q.norm());
-      return q.toRotationMatrix().col(2).normalized();
+      point.rotation = q;
+    } else {
+      const Vec3 angles{number(kRz), number(kRy), number(kRx)};
+      point.rotation = Eigen::Quaterniond(
+          rotation_from_rpy(radians_from_degrees(angles[2]), radians_from_degrees(angles[1]),
+                            radians_from_degrees(angles[0])));
     }
-    const Vec3 angles{number(kRz), number(kRy), number(kRx)};
-    return rotation_from_rpy(radians_from_degrees(angles[2]), radians_from_degrees(angles[1]),
-                             radians_from_degrees(angles[0]))
-        .col(2);
+    point.location.axis = point.rotation.toRotationMatrix().col(2).normalized();
   }
 
   double checked_length(double length) {

@@ -17,7 +17,8 @@ namespace smoothpost {
 /// and CRLF.
 ///
 /// A row's feed and beam belong to the segment that ends at the row; those of the first row have no
-/// segment. Interpolation is great_circle throughout.
+/// segment. Interpolation is great_circle with i,j,k; slerp with whole rotations, and the path is
+/// full_pose.
 ///   feed > 0: MotionKind::feed, duration = tip distance / feed; a segment that only turns has
 ///     duration 0 and is to be stretched to the axis limits by whoever plans its time;
 ///   feed 0 or empty: MotionKind::rapid, duration 0; refused while the beam is on.

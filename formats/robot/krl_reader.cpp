@@ -153,6 +153,7 @@ class Reader {
     if (state_ == State::done) return error("NC320", "text stands behind END", column_ + 1);
     if (state_ == State::head) return read_head(text);
     if (upper(text) == "END") {
+      if (in_spline_) error("NC320", "the program ends within a SPLINE", column_ + 1);
       state_ = State::done;
       out_.program.end_line = line_;
       return;
@@ -195,6 +196,8 @@ class Reader {
     Cursor cursor(text);
     const std::string first = cursor.word();
     if (first.empty()) return fault("NC321", "no statement begins like this", cursor);
+    if (first == "SPLINE" || first == "ENDSPLINE" || first == "SPL" || in_spline_)
+      return read_in_spline(cursor, first, out);
     if (first == "PTP" || first == "LIN") {
       out.kind = Statement::Kind::motion;
       out.name = first;
@@ -211,15 +214,53 @@ class Reader {
       return !cursor.done() || fault("NC321", "an interrupt statement ends too early", cursor);
     }
     if (first == "DECL") return read_declaration(cursor, out);
-    static constexpr std::array<std::string_view, 16> kOther = {
-        "CIRC", "SPTP", "SLIN",   "SCIRC",  "SPLINE", "IF",     "FOR",    "WHILE",
-        "LOOP", "GOTO", "REPEAT", "SWITCH", "DEF",    "RETURN", "DEFFCT", "DEFDAT"};
+    static constexpr std::array<std::string_view, 15> kOther = {
+        "CIRC", "SPTP",   "SLIN",   "SCIRC", "IF",     "FOR",    "WHILE", "LOOP",
+        "GOTO", "REPEAT", "SWITCH", "DEF",   "RETURN", "DEFFCT", "DEFDAT"};
     if (std::find(kOther.begin(), kOther.end(), first) != kOther.end())
       return fault("NC321", first + " is not read here", cursor);
     return read_assignment_or_call(cursor, first, out);
   }
 
-  bool read_motion(Cursor& cursor, Statement& out) {
+  // SPLINE, what may stand in its block, ENDSPLINE.
+  bool read_in_spline(Cursor& cursor, const std::string& first, Statement& out) {
+    if (first == "SPLINE") {
+      if (in_spline_) return fault("NC321", "SPLINE stands within a SPLINE", cursor);
+      in_spline_ = true;
+      spline_points_ = 0;
+      out.kind = Statement::Kind::spline_begin;
+      return read_with(cursor, out);
+    }
+    if (!in_spline_) return fault("NC321", first + " stands outside SPLINE ... ENDSPLINE", cursor);
+    if (first == "ENDSPLINE") {
+      in_spline_ = false;
+      out.kind = Statement::Kind::spline_end;
+      if (spline_points_ == 0) return fault("NC321", "a SPLINE has no SPL", cursor);
+      return cursor.done() || fault("NC321", "text stands behind ENDSPLINE", cursor);
+    }
+    if (first == "TRIGGER") {
+      if (!read_trigger(cursor, out)) return false;
+      return out.by_path || fault("NC321", "TRIGGER within a SPLINE needs PATH", cursor);
+    }
+    if (first != "SPL") return fault("NC321", first + " cannot stand within a SPLINE", cursor);
+    ++spline_points_;
+    out.kind = Statement::Kind::motion;
+    out.name = first;
+    return read_target(cursor, out) && read_with(cursor, out);
+  }
+
+  bool read_with(Cursor& cursor, Statement& out) {
+    if (cursor.done()) return true;
+    if (!cursor.keyword("WITH") || !cursor.keyword("$VEL") || !cursor.take('.') ||
+        !cursor.keyword("CP") || !cursor.take('='))
+      return fault("NC321", "only WITH $VEL.CP= may follow", cursor);
+    out.speed = cursor.number();
+    if (!out.speed || !(*out.speed > 0.0) || !cursor.done())
+      return fault("NC321", "WITH $VEL.CP= needs one number above 0", cursor);
+    return true;
+  }
+
+  bool read_target(Cursor& cursor, Statement& out) {
     if (!read_aggregate(cursor, out.aggregate)) return false;
     KeyFamily family = KeyFamily::none;
     for (const auto& [key, value] : out.aggregate.values) {
@@ -228,14 +269,19 @@ class Reader {
       if (f != KeyFamily::external && f != family)
         return fault("NC322", "keys of joints and of a pose stand in one target", cursor);
     }
-    if (out.name == "LIN") {
-      if (family != KeyFamily::pose) return fault("NC322", "LIN needs a pose", cursor);
+    if (out.name != "PTP") {
+      if (family != KeyFamily::pose) return fault("NC322", out.name + " needs a pose", cursor);
       for (const char* key : {"X", "Y", "Z", "A", "B", "C"})
         if (!out.aggregate.find(key))
-          return fault("NC322", std::string("LIN has no value ") + key, cursor);
+          return fault("NC322", out.name + " has no value " + key, cursor);
     } else if (family == KeyFamily::pose) {
       return fault("NC322", "PTP to a pose is not read here: write its joints", cursor);
     }
+    return true;
+  }
+
+  bool read_motion(Cursor& cursor, Statement& out) {
+    if (!read_target(cursor, out)) return false;
     if (cursor.done()) return true;
     out.blend = cursor.word();
     const bool fits = out.name == "PTP"
@@ -262,12 +308,8 @@ class Reader {
 
   bool read_trigger(Cursor& cursor, Statement& out) {
     out.kind = Statement::Kind::trigger;
-    if (!cursor.keyword("WHEN") || !cursor.keyword("DISTANCE") || !cursor.take('='))
-      return fault("NC321", "TRIGGER needs WHEN DISTANCE=", cursor);
-    const auto distance = cursor.number();
-    if (distance != 0.0 && distance != 1.0)
-      return fault("NC321", "DISTANCE is 0 (start) or 1 (end)", cursor);
-    out.distance = *distance == 0.0 ? 0 : 1;
+    if (!cursor.keyword("WHEN")) return fault("NC321", "TRIGGER needs WHEN", cursor);
+    if (!read_place(cursor, out)) return false;
     if (!cursor.keyword("DELAY") || !cursor.take('='))
       return fault("NC321", "TRIGGER needs DELAY=", cursor);
     out.number = cursor.number();
@@ -277,10 +319,29 @@ class Reader {
     Cursor body(out.body);
     const std::string name = body.word();
     Statement inner;
-    if (name.empty() || name == "PTP" || name == "LIN" || name == "TRIGGER" || name == "WAIT" ||
-        name == "HALT")
+    static constexpr std::array<std::string_view, 8> kNotInDo = {
+        "PTP", "LIN", "SPL", "SPLINE", "ENDSPLINE", "TRIGGER", "WAIT", "HALT"};
+    if (name.empty() || std::find(kNotInDo.begin(), kNotInDo.end(), name) != kNotInDo.end())
       return fault("NC321", "DO needs an assignment or a call", cursor);
     return read_assignment_or_call(body, name, inner);
+  }
+
+  bool read_place(Cursor& cursor, Statement& out) {
+    out.by_path = cursor.keyword("PATH");
+    if (!out.by_path && !cursor.keyword("DISTANCE"))
+      return fault("NC321", "TRIGGER needs WHEN DISTANCE= or WHEN PATH=", cursor);
+    if (!cursor.take('=')) return fault("NC321", "a = is missing", cursor);
+    const auto number = cursor.number();
+    if (out.by_path) {
+      if (!number) return fault("NC321", "PATH has no number", cursor);
+      out.path = *number;
+      out.distance = cursor.keyword("ONSTART") ? 0 : 1;
+      return true;
+    }
+    if (number != 0.0 && number != 1.0)
+      return fault("NC321", "DISTANCE is 0 (start) or 1 (end)", cursor);
+    out.distance = *number == 0.0 ? 0 : 1;
+    return true;
   }
 
   bool read_wait(Cursor& cursor, Statement& out) {
@@ -367,6 +428,8 @@ class Reader {
   State state_ = State::head;
   std::uint32_t line_ = 0;
   std::size_t column_ = 0;
+  bool in_spline_ = false;
+  std::size_t spline_points_ = 0;
   ParsedKrl out_;
 };
 

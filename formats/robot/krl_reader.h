@@ -12,8 +12,12 @@
 // KUKA Robot Language, the statement subset that we write and read back: one statement a line.
 //   file = {"&" text} "DEF" id "(" ")" {statement} "END"
 //   statement = declaration | assignment | call | motion | trigger | wait | "HALT" | interrupt
+//             | spline
 //   motion = ("PTP" | "LIN") aggregate ["C_PTP" | "C_DIS" | "C_VEL" | "C_ORI"]
-//   trigger = "TRIGGER" "WHEN" "DISTANCE" "=" ("0" | "1") "DELAY" "=" number "DO" statement
+//   spline = "SPLINE" [with] {{trigger} "SPL" aggregate [with]} "ENDSPLINE", triggers by PATH
+//   with = "WITH" "$VEL.CP" "=" number
+//   trigger = "TRIGGER" "WHEN" ("DISTANCE" "=" ("0" | "1") | "PATH" "=" number ["ONSTART"])
+//             "DELAY" "=" number "DO" statement
 //   wait = "WAIT" "SEC" number
 namespace smoothpost::krl {
 
@@ -30,6 +34,8 @@ struct Statement {
     assignment,   ///< target = value
     call,         ///< name(...)
     motion,
+    spline_begin,
+    spline_end,
     trigger,  ///< `body` is what it does
     wait_seconds,
     halt,
@@ -39,11 +45,14 @@ struct Statement {
   std::uint32_t column = 0;
   std::string text;  ///< as written, without comment and outer blanks
   std::string
-      name;  ///< assignment: target; call, declaration: name; motion: PTP or LIN. Upper case
+      name;  ///< assignment: target; call, declaration: name; motion: PTP, LIN, SPL. Upper case
   std::string value;  ///< assignment: right side; call: what stands in the parentheses. As written
   Aggregate aggregate;           ///< motion, or an assignment of one
   std::optional<double> number;  ///< wait; trigger: delay; an assignment of one number
   int distance = 0;              ///< trigger: 0 start point, 1 end point of the next motion
+  bool by_path = false;          ///< trigger: PATH instead of DISTANCE
+  double path = 0.0;             ///< trigger by PATH: mm from that point, negative before it
+  std::optional<double> speed;   ///< SPLINE, SPL: the number of WITH $VEL.CP=
   std::string blend;             ///< motion: C_DIS ... or empty
   std::string body;              ///< trigger: the statement behind DO
 };

@@ -18,6 +18,7 @@ struct CutterLocation {
 /// How the cutter location moves between two path points, as the input's controller would do it.
 enum class PathInterpolation : std::uint8_t {
   great_circle,   ///< tip on the line or arc, axis on the great circle (CSV, direction vectors)
+  slerp,          ///< tip on the line, the whole rotation about one fixed axis (full_pose)
   rotary_linear,  ///< tip on the line or arc, the input machine's rotary joints linear (TCP mode)
   joint_linear    ///< every joint of the input machine linear (no TCP mode; arcs in joint space)
 };

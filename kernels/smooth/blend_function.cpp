@@ -28,10 +28,10 @@ double solve(const Septic& sigma, double u, double guess) {
   for (int i = 0; i < kNewtonSteps; ++i) {
     const SepticValue v = evaluate(sigma, t);
     const double error = v.value - u;
-    (error > 0.0 ? high : low) = t;
     double next = t - error / v.d1;
+    if (std::abs(next - t) <= 1e-15) return std::clamp(next, 0.0, 1.0);
+    (error > 0.0 ? high : low) = t;
     if (!(next > low && next < high)) next = 0.5 * (low + high);
-    if (std::abs(next - t) <= 1e-15 || error == 0.0) return next;
     t = next;
   }
   return t;

@@ -13,6 +13,8 @@ constexpr double kNoMotion = 1e-9;  // mm
 constexpr double kNoTurn = 1e-12;   // rad
 constexpr double kStraight = 1e-9;  // of |T1 − T0|: no corner
 constexpr double kJoined = 1e-6;    // mm and rad: legs lead from node to node
+constexpr double kSameBreak = 1e-13;  // of a leg
+constexpr int kBisections = 40;
 constexpr double kMostSlope = 1.1;  // of a blend function, see blend_function.h
 
 /// sin(y)/y and (cos(y) − 1)/y with three derivatives by y, without cancellation.
@@ -53,26 +55,42 @@ Circular circular(double y) {
   return {divided(s, c, -s, -c), divided(c - 1.0, -s, -c, s)};
 }
 
+/// cos(y/2) and sin(y/2)/y with three derivatives by s = y²; entire in s.
+struct HalfAngle {
+  std::array<double, 4> cosine{};
+  std::array<double, 4> sine{};
+};
+
+HalfAngle half_angle(double s) {
+  HalfAngle h;
+  if (s < 1.0) {
+    double coefficient = 0.5;  // (−1/4)^k / (2 (2k + 1)!)
+    for (int k = 0; k < 12; ++k) {
+      double term = coefficient;
+      for (int r = 0; r <= 3 && r <= k; ++r) {
+        h.sine[static_cast<std::size_t>(r)] += term * std::pow(s, k - r);
+        term *= k - r;
+      }
+      coefficient *= -0.25 / ((2.0 * k + 2.0) * (2.0 * k + 3.0));
+    }
+    h.cosine[0] = std::cos(0.5 * std::sqrt(s));
+  } else {
+    // 2s·g' + g = f/2 and f' = −g/4, differentiated.
+    const double y = std::sqrt(s);
+    h.cosine[0] = std::cos(0.5 * y);
+    h.sine[0] = std::sin(0.5 * y) / y;
+    h.sine[1] = (0.5 * h.cosine[0] - h.sine[0]) / (2.0 * s);
+    h.sine[2] = (-0.125 * h.sine[0] - 3.0 * h.sine[1]) / (2.0 * s);
+    h.sine[3] = (-0.125 * h.sine[1] - 5.0 * h.sine[2]) / (2.0 * s);
+  }
+  for (std::size_t r = 0; r < 3; ++r) h.cosine[r + 1] = -0.25 * h.sine[r];
+  return h;
+}
+
 /// exp of half the rotation vector φ(σ) as a quaternion (w, x, y, z) with three derivatives.
 std::array<Eigen::Vector4d, 4> exponential(const std::array<Vec3, 4>& phi) {
-  // w = f(s), v = g(s)·φ with s = |φ|²: f = cos(√s/2), g = sin(√s/2)/√s are entire in s.
-  std::array<double, 4> f{};
-  std::array<double, 4> g{};
   const double s = phi[0].squaredNorm();
-  double coefficient = 1.0;  // (−1/4)^k / (2k)!
-  for (int k = 0; k < 40; ++k) {
-    double of_f = coefficient;
-    double of_g = 0.5 * coefficient / (2.0 * k + 1.0);
-    for (int r = 0; r <= 3 && r <= k; ++r) {
-      const double power = std::pow(s, k - r);
-      f[static_cast<std::size_t>(r)] += of_f * power;
-      g[static_cast<std::size_t>(r)] += of_g * power;
-      of_f *= k - r;
-      of_g *= k - r;
-    }
-    coefficient *= -0.25 / ((2.0 * k + 1.0) * (2.0 * k + 2.0));
-    if (k > 3 && std::abs(coefficient) * std::pow(s, k + 1) < 1e-22) break;
-  }
+  const auto [f, g] = half_angle(s);
   const double s1 = 2.0 * phi[0].dot(phi[1]);
   const double s2 = 2.0 * (phi[1].squaredNorm() + phi[0].dot(phi[2]));
   const double s3 = 2.0 * (3.0 * phi[1].dot(phi[2]) + phi[0].dot(phi[3]));
@@ -253,19 +271,54 @@ void CornerPath::plan_tip() {
     corners_[i].half_width = extents[i] / corners_[i].blend.reach();
 }
 
+// Where only an axis counts: with δ = h·g·(w1 − w0) the axis turns by at most
+// ∫|across(J·δ)| ≤ |across δ| + |across(φ × δ)|/2 + |φ|·|φ × δ|/6, and φ × δ = x·h·g·(w0 × w1). As
+// g(−u) ≤ g(0)(1 − u/reach), that is at most h·g(0)·max over v ∈ [0, 1] of (1 − v)(A + D·v).
+double CornerPath::axis_deviation(std::size_t node, double half_width) const {
+  const Vec3 in = rate(leg_before(node));
+  const Vec3 out = rate(leg_after(node));
+  const Vec3 jump = out - in;
+  const auto across = [this](const Vec3& v) {
+    return settings_.tool_axis->cross(v).norm();
+  };
+  const double turned = half_width * rotation_blend_.at_zero();
+  const double extent = half_width * rotation_blend_.reach();
+  const Vec3 twist = in.cross(out);
+  const double most_turn = extent * std::max(in.norm(), out.norm()) + turned * jump.norm();
+  const double a = across(jump);
+  const double d = extent * (across(twist) / 2.0 + most_turn * twist.norm() / 6.0);
+  const double rate_bound = d <= a ? a : (a + d) * (a + d) / (4.0 * d);
+  return turned * std::min(jump.norm(), rate_bound);
+}
+
+double CornerPath::rotation_extent(std::size_t node) const {
+  const double shorter = std::min(lengths_[leg_before(node)], lengths_[leg_after(node)]);
+  const double reach = rotation_blend_.reach();
+  const double room = settings_.rotation_tolerance / rotation_blend_.at_zero();
+  const Vec3 jump = rate(leg_after(node)) - rate(leg_before(node));
+  double low = room / jump.norm();
+  if (!settings_.tool_axis || low * reach >= shorter) return std::min(reach * low, shorter);
+  // Rotation about the tool alone may be blended as far as the legs go.
+  const double across = settings_.tool_axis->cross(jump).norm();
+  double high = across * shorter > room * reach ? room / across : shorter / reach;
+  if (axis_deviation(node, high) <= settings_.rotation_tolerance * (1.0 + 1e-14))
+    return reach * high;
+  for (int i = 0; i < kBisections; ++i) {
+    const double middle = 0.5 * (low + high);
+    (axis_deviation(node, middle) <= settings_.rotation_tolerance ? low : high) = middle;
+  }
+  return reach * low;
+}
+
 void CornerPath::plan_rotation() {
   std::vector<double> extents(nodes_.size(), 0.0);
   std::vector<double> weights(nodes_.size(), 0.0);
   for (std::size_t i = settings_.closed ? 0 : 1; i + 1 < nodes_.size(); ++i) {
     if (corners_[i].stop || !can_blend(i)) continue;
-    Vec3 jump = rate(leg_after(i)) - rate(leg_before(i));
+    const Vec3 jump = rate(leg_after(i)) - rate(leg_before(i));
     weights[i] = jump.norm();
-    if (settings_.tool_axis) jump -= *settings_.tool_axis * settings_.tool_axis->dot(jump);
     if (weights[i] < kNoTurn) continue;
-    // Rotation about the tool alone may be blended as far as the legs go.
-    const double shorter = std::min(lengths_[leg_before(i)], lengths_[leg_after(i)]);
-    const double half = settings_.rotation_tolerance / (rotation_blend_.at_zero() * jump.norm());
-    extents[i] = std::min(rotation_blend_.reach() * half, shorter);
+    extents[i] = rotation_extent(i);
   }
   share(extents, weights);
   for (std::size_t i = 0; i < nodes_.size(); ++i)
@@ -380,7 +433,9 @@ std::vector<double> CornerPath::breaks(std::size_t leg) const {
   add(a.rotation_half_width * rotation_blend_.reach());
   add(length - b.rotation_half_width * rotation_blend_.reach());
   std::sort(at.begin(), at.end());
-  at.erase(std::unique(at.begin(), at.end()), at.end());
+  const auto same = [length](double x, double y) { return y - x <= kSameBreak * length; };
+  at.erase(std::unique(at.begin(), at.end(), same), at.end());
+  if (at.size() > 1 && same(at.back(), length)) at.pop_back();
   at.push_back(length);
   return at;
 }

@@ -52,7 +52,8 @@ struct Corner {
   bool stop = false;                               ///< a reversal: the tip has to come to rest here
 };
 
-/// Value and the first three derivatives by σ: tip, and the quaternion (w, x, y, z).
+/// Value and the first three derivatives by σ: tip, and the quaternion (w, x, y, z), whose sign may
+/// change from window to window (that of the window's node).
 struct PoseDerivatives {
   std::array<Vec3, 4> tip;
   std::array<Eigen::Vector4d, 4> rotation;
@@ -76,7 +77,7 @@ struct PoseDerivatives {
 ///
 /// Half widths: h·g(0)·(|T1 − T0| + reach·h·K/2) = tip_tolerance with K the sum of the legs'
 /// curvatures, h'·g(0)·|w1 − w0| = rotation_tolerance (tool_axis: of the part of w1 − w0 across
-/// it). Two neighbours that want more of a leg than there is share it by their curvature, k =
+/// it, less where turns about the tool and across it together would move the axis further). Two neighbours that want more of a leg than there is share it by their curvature, k =
 /// sin(θ/2)/cos²(θ/2) (rotation: |w1 − w0|): each takes at least its share, at most what the other
 /// leaves, never more than the leg together. Tip and rotation do so apart from each other: their
 /// windows may overlap in any order, at one corner and between neighbours, because they are two
@@ -150,6 +151,8 @@ class CornerPath {
   void check_legs() const;
   void plan_tip();
   void plan_rotation();
+  double axis_deviation(std::size_t node, double half_width) const;
+  double rotation_extent(std::size_t node) const;
   void share(std::vector<double>& extents, const std::vector<double>& weights) const;
 
   /// Where x of a leg lies: the node whose window it is in or whose leg it is on, x from there.

@@ -11,7 +11,8 @@ constexpr double kNoTurn = 1e-12;      // rad
 constexpr double kLargestAngle = 0.3;  // rad of axis turn in one leg
 
 bool repeats(const MergePoint& a, const MergePoint& b) {
-  return (a.tip - b.tip).norm() < kNoMotion && (a.axis - b.axis).norm() < kNoTurn;
+  return (a.tip - b.tip).norm() < kNoMotion && (a.axis - b.axis).norm() < kNoTurn &&
+         a.rotation.angularDistance(b.rotation) < kNoTurn;
 }
 
 /// Whether a straight leg from a to b stands for all points between.
@@ -29,6 +30,12 @@ bool stands_for(std::span<const MergePoint> points, std::size_t a, std::size_t b
                                       : static_cast<double>(i - a) / static_cast<double>(b - a);
     const Vec3 tip = from.tip + share * (to.tip - from.tip);
     if ((points[i].tip - tip).norm() > settings.tip_tolerance) return false;
+    if (settings.whole_rotation) {
+      const Eigen::Quaterniond turned = from.rotation.slerp(share, to.rotation);
+      if (points[i].rotation.angularDistance(turned) > settings.axis_tolerance + kNoTurn)
+        return false;
+      continue;
+    }
     const Vec3 axis = (from.axis + share * (to.axis - from.axis)).normalized();
     if ((points[i].axis - axis).norm() + allowance > settings.axis_tolerance + kNoTurn)
       return false;

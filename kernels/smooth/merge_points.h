@@ -12,6 +12,7 @@ namespace smoothpost {
 struct MergePoint {
   Vec3 tip = Vec3::Zero();    ///< mm
   Vec3 axis = Vec3::UnitZ();  ///< unit
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< with settings.whole_rotation
   double length = 0.0;        ///< mm along the path from its start, not decreasing
   bool keep = false;          ///< must stay: an event, a change of feed, the end of an arc
 };
@@ -19,6 +20,7 @@ struct MergePoint {
 struct MergeSettings {
   double tip_tolerance = 0.0;   ///< mm
   double axis_tolerance = 0.0;  ///< rad
+  bool whole_rotation = false;  ///< axis_tolerance is for `rotation`, not for the axis alone
   int longest = 48;             ///< points that one leg may take the place of
 };
 

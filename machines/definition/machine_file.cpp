@@ -71,8 +71,9 @@ class Reader {
     machine.cycle = read_cycle(root_.table("cycle", "[cycle]"));
     machine.standoff = read_standoff(root_.table("standoff", "[standoff]"), machine.axes);
     machine.links = read_links(root_.table("links", "[links]"), machine.axes);
-    machine.tolerance = read_tolerance(root_.table("tolerance", "[tolerance]"));
     machine.recipe = read_recipe(root_.table("recipe", "[recipe]"));
+    machine.tolerance =
+        read_tolerance(root_.table("tolerance", "[tolerance]"), machine.recipe.smoothing != "none");
     machine.dialect = read_dialect(root_.table("dialect", "[dialect]"), machine.cycle);
     check_axes(machine.axes, items, machine.dialect.name, problems_);
     TableReader process = root_.table("process", "[process]");
@@ -80,6 +81,9 @@ class Reader {
     if (process.has("power")) machine.power = read_power(process.table("power", "[process.power]"));
     process.entry("power");
     process.finish();
+    if (root_.has("variant"))
+      check_variants(root_.table("variant", "[variant]"), machine.cycle, problems_);
+    root_.entry("variant");
     root_.finish();
     return machine;
   }
@@ -144,7 +148,7 @@ Result<MachineDefinition> parse_machine_file(std::string_view text, const std::s
   auto tree = parse_toml(text, file_name);
   if (!tree.ok()) return Result<MachineDefinition>::failure(tree.diagnostics());
   machine_file::Problems problems;
-  for (const auto& change : overrides) machine_file::apply_override(tree.value(), change, problems);
+  machine_file::choose_dialect(tree.value(), overrides, problems);
   MachineDefinition machine = machine_file::Reader(tree.value(), file_name, problems).read();
   return machine_file::finished(std::move(machine), problems);
 }

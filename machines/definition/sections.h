@@ -24,7 +24,8 @@ Body read_body(const TomlValue& item, const std::vector<AxisDefinition>& axes, P
 CycleSettings read_cycle(TableReader reader);
 StandoffSettings read_standoff(TableReader reader, const std::vector<AxisDefinition>& axes);
 LinkSettings read_links(TableReader reader, const std::vector<AxisDefinition>& axes);
-ToleranceSettings read_tolerance(TableReader reader);
+/// `smooths`: the recipe smooths, so that merging and smoothing have shares of their own.
+ToleranceSettings read_tolerance(TableReader reader, bool smooths);
 RecipeSettings read_recipe(TableReader reader);
 DialectSettings read_dialect(TableReader reader, const CycleSettings& cycle);
 
@@ -34,6 +35,17 @@ PowerTable read_power(TableReader reader);
 
 /// Changes one value of the tree. Everything it puts there is located as `--set <key>`.
 void apply_override(TomlTable& root, const MachineOverride& change, Problems& problems);
+
+/// Applies all overrides, and makes [dialect] and [process] those of the dialect that they choose.
+/// When that is not the file's own, its [variant.NAME] is laid over them: keys of `dialect` one by
+/// one, `process` as a whole (the power table stays unless it has one). Nothing of the file's own
+/// controller is left: events, start and end lines and extension come from the variant or are none
+/// (extension: the dialect's usual one). What was taken is gone from [variant.NAME].
+void choose_dialect(TomlTable& root, const std::vector<MachineOverride>& overrides,
+                    Problems& problems);
+
+/// Checks what stands in [variant] and was not taken.
+void check_variants(TableReader reader, const CycleSettings& cycle, Problems& problems);
 
 /// Where to point when several keys are wrong together: the first that an override has set, else
 /// the last.

@@ -57,6 +57,20 @@ Pose read_pose(TableReader& reader, std::string_view key, const std::string& nam
   return pose;
 }
 
+// Every key is required: a controller that moves a load which it does not know is worse off than
+// one that is told nothing.
+LoadData read_load(TableReader reader) {
+  LoadData load;
+  load.mass = reader.required().number("mass_kg", Bound::positive).value_or(1.0);
+  load.centre = reader.required().vector("centre_mm").value_or(load.centre);
+  load.inertia = reader.required().vector("inertia_kg_m2").value_or(load.inertia);
+  if (load.inertia.minCoeff() < 0.0)
+    reader.error("MF108", "inertia_kg_m2 has " + to_text(load.inertia.minCoeff()) + ": at least 0",
+                 "inertia_kg_m2");
+  reader.finish();
+  return load;
+}
+
 }  // namespace
 
 ToolDefinition read_tool(TableReader reader) {
@@ -72,6 +86,8 @@ ToolDefinition read_tool(TableReader reader) {
         "MF124",
         "min_gap_mm " + to_text(tool.min_gap) + " is more than gap_mm " + to_text(tool.gap),
         blame(reader, {"gap_mm", "min_gap_mm"}));
+  if (reader.has("load")) tool.load = read_load(reader.table("load", "[tool.load]"));
+  reader.entry("load");
   reader.finish();
   return tool;
 }
@@ -199,8 +215,9 @@ LinkSettings read_links(TableReader reader, const std::vector<AxisDefinition>& a
 
 namespace {
 
-ToleranceBudget read_budget(TableReader reader) {
+ToleranceBudget read_budget(TableReader reader, bool smooths) {
   ToleranceBudget budget;
+  if (!smooths) budget = {0.0, 0.0, 0.65, 0.05, 0.30};
   const auto share = [&](std::string_view key, double fallback) {
     return reader.number_or(key, fallback, Bound::not_negative);
   };
@@ -222,7 +239,7 @@ ToleranceBudget read_budget(TableReader reader) {
 
 }  // namespace
 
-ToleranceSettings read_tolerance(TableReader reader) {
+ToleranceSettings read_tolerance(TableReader reader, bool smooths) {
   ToleranceSettings tolerance;
   tolerance.tip = reader.number_or("tip_mm", 0.01, Bound::positive);
   tolerance.axis = radians_or(reader, "axis_deg", 0.05, Bound::positive);
@@ -235,7 +252,7 @@ ToleranceSettings read_tolerance(TableReader reader) {
     reader.error("MF108",
                  "limit_share is " + to_text(tolerance.limit_share) + " and has to be at most 1",
                  "limit_share");
-  tolerance.budget = read_budget(reader.table("budget", "[tolerance.budget]"));
+  tolerance.budget = read_budget(reader.table("budget", "[tolerance.budget]"), smooths);
   reader.finish();
   return tolerance;
 }

@@ -295,6 +295,16 @@ std::vector<const TomlValue*> TableReader::tables(std::string_view key) {
   return out;
 }
 
+std::vector<const TomlEntry*> TableReader::entries() {
+  std::vector<const TomlEntry*> out;
+  if (table_ == nullptr) return out;
+  for (const auto& entry : table_->entries()) {
+    out.push_back(&entry);
+    known_.emplace_back(entry.key);
+  }
+  return out;
+}
+
 void TableReader::report_unknown(const TomlEntry& entry) {
   const std::string shown = entry.key.substr(0, 64);
   const bool same_stem = without_unit(entry.key) != entry.key || entry.key.size() < 64;

@@ -69,6 +69,8 @@ class TableReader {
   std::vector<const TomlValue*> tables(std::string_view key);
 
   bool has(std::string_view key) const;
+  /// All entries of a table whose keys are names of the file's own; they become known.
+  std::vector<const TomlEntry*> entries();
   /// Makes a key known without reading it.
   const TomlEntry* entry(std::string_view key);
   /// Place of the value of a key; of the table when it is absent.

@@ -1,14 +1,14 @@
 #include "machines/dialects/krl.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "kernels/core/units.h"
 #include "kernels/kinematics/screw_chain.h"
 #include "machines/dialects/decimal.h"
 #include "machines/dialects/event_text.h"
-#include "machines/dialects/zyx_angles.h"
+#include "machines/dialects/krl_line.h"
+#include "machines/dialects/krl_text.h"
 
 namespace smoothpost::krl {
 
@@ -20,36 +20,21 @@ constexpr double kLinkPercent = 100.0;
 constexpr double kLinkSpeed = 0.25;         // m/s, of links whose tip goes straight
 constexpr double kLeastOrientation = 60.0;  // deg/s
 constexpr double kNoLength = 1e-6;          // mm: a move that only turns
-constexpr std::size_t kMostTriggers = 8;
 constexpr double kMetresPerMillimetre = 1e-3;
-
-bool is_arm_axis(const std::string& name) {
-  return name.size() == 2 && name[0] == 'A' && name[1] >= '1' && name[1] <= '6';
-}
-bool is_external_axis(const std::string& name) {
-  return name.size() == 2 && name[0] == 'E' && name[1] >= '1' && name[1] <= '6';
-}
-
-// Decimals that keep six digits of a small number and three decimals of a large one.
-int decimals_of(double value) {
-  if (value <= 0.0) return 3;
-  return std::clamp(5 - static_cast<int>(std::floor(std::log10(value))), 3, 9);
-}
-
-std::string decimal(double value, int decimals) {
-  std::string out;
-  append_decimal(out, value, decimals);
-  return out;
-}
+constexpr double kMillisecondsPerSecond = 1e3;
+constexpr int kPathDigits = 5;               // of PATH in a TRIGGER, mm
+constexpr std::size_t kMostSplPoints = 500;  // of one block: it is computed before it starts
 
 class Emitter {
  public:
   Emitter(const MachineDefinition& machine, const MachineProgram& program)
-      : machine_(machine), program_(program), chain_(chain_of(machine, program.tool_length)) {
+      : machine_(machine),
+        program_(program),
+        chain_(chain_of(machine, program.tool_length)),
+        text_(machine) {
     chain_.workpiece_home = program.part;
-    angle_digits_ = std::max(5, machine.dialect.digits_angle);
     out_.move_lines.reserve(program.moves.size());
-    out_.text.reserve(96 * program.moves.size() + 4096);
+    text_.reserve(96 * program.moves.size() + 4096);
   }
 
   Result<EmittedProgram> run() {
@@ -57,16 +42,16 @@ class Emitter {
     if (has_error(diagnostics_)) return Result<EmittedProgram>::failure(std::move(diagnostics_));
     find_orientation_limit();
     header();
-    std::size_t action = 0;
-    for (std::size_t i = 0; i <= program_.moves.size(); ++i) {
-      const std::size_t first = action;
-      while (action < program_.actions.size() && program_.actions[action].before == i) ++action;
-      print_actions(first, action, i < program_.moves.size());
-      if (i < program_.moves.size()) print_move(program_.moves[i]);
+    for (std::size_t i = 0; i < program_.moves.size();) {
+      print_actions(i, true);
+      i = print_motion(i) + 1;
     }
-    for (const auto& line : machine_.dialect.end) put_line(line);
-    put_line("END");
-    out_.line_count = line_;
+    print_actions(program_.moves.size(), false);
+    end_spline();
+    for (const auto& line : machine_.dialect.end) text_.line(line);
+    text_.line("END");
+    out_.line_count = text_.lines();
+    out_.text = text_.take();
     if (has_error(diagnostics_)) return Result<EmittedProgram>::failure(std::move(diagnostics_));
     return Result<EmittedProgram>(std::move(out_), std::move(diagnostics_));
   }
@@ -97,47 +82,38 @@ class Emitter {
   }
 
   void header() {
-    put_line("&ACCESS RVP");
-    put_line("&REL 1");
-    put_line("DEF smoothpost( )");
+    text_.line("&ACCESS RVP");
+    text_.line("&REL 1");
+    text_.line("DEF smoothpost( )");
     if (!program_.certified)
-      put_line("; NOT CERTIFIED. Written with --force: read the report before you run it");
-    put_line("DECL REAL SP_LINK");
-    put_line(";FOLD INI");
-    put_line("GLOBAL INTERRUPT DECL 3 WHEN $STOPMESS==TRUE DO IR_STOPM( )");
-    put_line("INTERRUPT ON 3");
-    put_line("BAS(#INITMOV,0)");
-    put_line(";ENDFOLD (INI)");
-    for (const auto& line : program_.title) put_line("; " + plain_text(line, kMaxComment));
-    for (const auto& line : machine_.dialect.start) put_line(line);
-    put_line("; speed of links on a straight line, m/s");
-    put_line("$ADVANCE=3");
+      text_.line("; NOT CERTIFIED. Written with --force: read the report before you run it");
+    text_.line("DECL REAL SP_LINK");
+    text_.line(";FOLD INI");
+    text_.line("GLOBAL INTERRUPT DECL 3 WHEN $STOPMESS==TRUE DO IR_STOPM( )");
+    text_.line("INTERRUPT ON 3");
+    text_.line("BAS(#INITMOV,0)");
+    text_.line(";ENDFOLD (INI)");
+    for (const auto& line : program_.title) text_.line("; " + plain_text(line, kMaxComment));
+    for (const auto& line : machine_.dialect.start) text_.line(line);
+    text_.line("; speed of links on a straight line, m/s");
+    text_.line("$ADVANCE=3");
     modal_words();
-    if (!program_.certified) put_line("HALT");
+    if (!program_.certified) text_.line("HALT");
   }
 
   // Everything that motions rely on; printed again at each label.
   void modal_words() {
-    put_line("$BASE={" + pose_text(program_.part, machine_.dialect.digits_length) + "}");
-    put_line("$TOOL={" +
-             pose_text(tool_frame(machine_, program_.tool_length), machine_.dialect.digits_length) +
-             "}");
-    put_line("SP_LINK=" + decimal(kLinkSpeed, 3));
-    put_line("$IPO_MODE=#BASE");
-    put_line("$ORI_TYPE=#VAR");
-    if (blends()) {
-      put_line("$APO.CDIS=" +
-               decimal(machine_.tolerance.tip * machine_.tolerance.budget.controller, 5));
-      put_line("$APO.CORI=" + decimal(degrees_from_radians(machine_.tolerance.axis *
-                                                           machine_.tolerance.budget.controller),
-                                      5));
-    }
-    printed_cp_.clear();
-    printed_orientation_.clear();
-    printed_percent_.clear();
+    text_.line("$BASE={" + text_.pose(program_.part) + "}");
+    text_.line("$TOOL={" + text_.pose(tool_frame(machine_, program_.tool_length)) + "}");
+    text_.line("SP_LINK=" + decimal(kLinkSpeed, 3));
+    text_.line("$IPO_MODE=#BASE");
+    text_.line("$ORI_TYPE=#VAR");
+    text_.forget();
+    if (rounds_)
+      text_.set("$APO.CORI", decimal(degrees_from_radians(machine_.tolerance.axis *
+                                                          machine_.tolerance.budget.controller),
+                                     5));
   }
-
-  bool blends() const { return machine_.dialect.path_mode == "blend"; }
 
   // $VEL.ORI1 and ORI2 of moves along a line: above what any of them needs, so that $VEL.CP
   // decides on their time.
@@ -151,6 +127,7 @@ class Emitter {
         fastest = std::max(fastest, degrees_from_radians(turn(from, to)) / move.duration);
       from = to;
       known = true;
+      rounds_ = rounds_ || blend_distance(move.blend) > 0.0;
     }
     orientation_limit_ = std::ceil(1.05 * fastest);
   }
@@ -163,56 +140,46 @@ class Emitter {
     return move.interpolation == MoveInterpolation::tool ? move.tool : forward(chain_, move.to);
   }
 
-  void put_line(std::string_view line) {
-    out_.text += line;
-    out_.text += '\n';
-    ++line_;
+  // A line that cannot stand within a SPLINE.
+  void statement(std::string_view line) {
+    end_spline();
+    text_.line(line);
   }
 
-  void set(const char* variable, std::string value, std::string& printed) {
-    if (value == printed) return;
-    put_line(std::string(variable) + "=" + value);
-    printed = std::move(value);
-  }
+  void comment(const std::string& text) { text_.line("; " + plain_text(text, kMaxComment)); }
 
-  void set_orientation(double degrees_per_second) {
-    const std::string value = decimal(degrees_per_second, decimals_of(degrees_per_second));
-    if (value == printed_orientation_) return;
-    put_line("$VEL.ORI1=" + value);
-    put_line("$VEL.ORI2=" + value);
-    printed_orientation_ = value;
-  }
-
-  // Events on the fly become triggers of the next motion unless the robot waits behind them.
-  void print_actions(std::size_t first, std::size_t last, bool motion_follows) {
-    std::vector<std::string> triggers;
-    for (std::size_t i = first; i < last; ++i) {
+  // The actions in front of `move`. Events on the fly become triggers of the next motion unless
+  // the robot waits behind them.
+  void print_actions(std::size_t move, bool motion_follows) {
+    const std::size_t first = action_;
+    while (action_ < program_.actions.size() && program_.actions[action_].before <= move) ++action_;
+    for (std::size_t i = first; i < action_; ++i) {
       const auto& action = program_.actions[i];
       if (action.kind == MachineAction::Kind::comment) {
-        put_line("; " + plain_text(action.text, kMaxComment));
+        comment(action.text);
       } else if (action.kind == MachineAction::Kind::cut_label) {
-        put_line("; " + plain_text(action.text, kMaxComment));
+        end_spline();
+        comment(action.text);
         modal_words();
       } else if (action.kind == MachineAction::Kind::dwell) {
         wait(action.seconds);
       } else if (const auto event = event_text(machine_, action, diagnostics_)) {
         if (event->is_comment) {
-          put_line("; " + plain_text(event->text, kMaxComment));
+          comment(event->text);
         } else if (motion_follows && event->on_the_fly && event->dwell == 0.0 &&
-                   !waits_behind(i + 1, last) && triggers.size() < kMostTriggers) {
-          triggers.push_back(event->text);
+                   !waits_behind(i + 1) && triggers_.size() < kMostTriggers) {
+          triggers_.push_back(event->text);
         } else {
-          put_line(event->text);
+          statement(event->text);
           if (event->dwell > 0.0) wait(event->dwell);
         }
       }
     }
-    pending_triggers_ = std::move(triggers);
   }
 
-  // Whether one of the actions stops the robot: a dwell, an event that is not on the fly.
-  bool waits_behind(std::size_t first, std::size_t last) const {
-    for (std::size_t i = first; i < last; ++i) {
+  // Whether one of the actions up to action_ stops the robot: a dwell, an event not on the fly.
+  bool waits_behind(std::size_t first) const {
+    for (std::size_t i = first; i < action_; ++i) {
       const auto& action = program_.actions[i];
       if (action.kind == MachineAction::Kind::dwell) return true;
       if (action.kind != MachineAction::Kind::event) continue;
@@ -222,23 +189,97 @@ class Emitter {
     return false;
   }
 
-  void wait(double seconds) { put_line("WAIT SEC " + decimal(seconds, 4)); }
+  void wait(double seconds) { statement("WAIT SEC " + decimal(seconds, 4)); }
 
-  void print_move(const MachineMove& move) {
-    const bool tool = move.interpolation == MoveInterpolation::tool;
-    if (tool)
-      print_line_speed(move);
+  // One motion; returns the last move that it makes.
+  std::size_t print_motion(std::size_t first) {
+    const MachineMove& move = program_.moves[first];
+    std::size_t last = first;
+    if (move.interpolation == MoveInterpolation::joints)
+      print_joints(move);
+    else if (is_spl(move))
+      print_spl(move);
     else
-      print_joint_speed(move);
-    for (const auto& text : pending_triggers_)
-      put_line("TRIGGER WHEN DISTANCE=0 DELAY=0 DO " + text);
-    pending_triggers_.clear();
-    put_line(tool ? line_text(move) : joints_text(move));
-    out_.move_lines.push_back(line_);
-    last_pose_ = pose_after(move);
-    last_place_ = tool ? printed(move.tool) : Vec3(last_pose_.translation());
-    last_joints_ = move.to;
+      last = print_line(first);
+    const MachineMove& end = program_.moves[last];
+    out_.move_lines.insert(out_.move_lines.end(), last - first + 1, text_.lines());
+    triggers_.clear();
+    last_pose_ = pose_after(end);
+    last_place_ = end.interpolation == MoveInterpolation::tool ? printed(end.tool)
+                                                               : Vec3(last_pose_.translation());
+    last_joints_ = end.to;
     started_ = true;
+    return last;
+  }
+
+  void print_joints(const MachineMove& move) {
+    end_spline();
+    print_joint_speed(move);
+    print_start_triggers("DISTANCE=0");
+    text_.line(joints_text(move));
+  }
+
+  std::size_t print_line(std::size_t first) {
+    end_spline();
+    JoinedLine joined{first, {}};
+    if (started_)
+      joined = joined_line(machine_, program_,
+                           {last_pose_, last_joints_, first, action_, triggers_.size()});
+    const MachineMove& end = program_.moves[joined.last];
+    double time = 0.0;
+    for (std::size_t i = first; i <= joined.last; ++i) time += program_.moves[i].duration;
+    for (; action_ < program_.actions.size() && program_.actions[action_].before <= joined.last;
+         ++action_)
+      if (program_.actions[action_].kind == MachineAction::Kind::comment)
+        comment(program_.actions[action_].text);
+    const double speed = print_line_speed(end, time);
+    const double distance = blend_distance(end.blend);
+    if (distance > 0.0) text_.set("$APO.CDIS", decimal(distance, 6));
+    print_start_triggers("DISTANCE=0");
+    for (const LineEvent& event : joined.events) print_early(event, speed, length_to(end));
+    text_.line("LIN " + text_.target(end.tool, end.to) + (distance > 0.0 ? " C_DIS" : ""));
+    return joined.last;
+  }
+
+  void print_start_triggers(const std::string& place) {
+    for (const auto& text : triggers_) text_.line("TRIGGER WHEN " + place + " DELAY=0 DO " + text);
+  }
+
+  // Back from the end of the LIN: whole milliseconds, and what is left as a way.
+  void print_early(const LineEvent& event, double speed, double length) {
+    const auto text = event_text(machine_, program_.actions[event.action], diagnostics_);
+    if (!text) return;
+    const double back = (1.0 - event.share) * length;
+    const double in_a_millisecond = speed / kMillisecondsPerSecond;
+    const double milliseconds = std::floor(back / in_a_millisecond + 1e-9);
+    const std::string rest =
+        decimal(-std::max(0.0, back - milliseconds * in_a_millisecond), kPathDigits);
+    text_.line("TRIGGER WHEN " + (rest == "0" ? std::string("DISTANCE=1") : "PATH=" + rest) +
+               " DELAY=" + decimal(-milliseconds, 0) + " DO " + text->text);
+  }
+
+  bool is_spl(const MachineMove& move) const {
+    return move.spline && started_ && !move.rapid && move.duration > 0.0 &&
+           length_to(move) >= kNoLength;
+  }
+
+  void print_spl(const MachineMove& move) {
+    const std::string speed = speed_text(length_to(move) / move.duration);
+    if (spl_points_ == kMostSplPoints) end_spline();
+    if (spl_points_ == 0) {
+      text_.set_orientation_speed(orientation_limit_);
+      text_.line("SPLINE WITH $VEL.CP=" + speed);
+      block_speed_ = speed;
+    }
+    ++spl_points_;
+    print_start_triggers("PATH=0 ONSTART");
+    text_.line("SPL " + text_.target(move.tool, move.to) +
+               (speed == block_speed_ ? "" : " WITH $VEL.CP=" + speed));
+  }
+
+  void end_spline() {
+    if (spl_points_ > 0) text_.line("ENDSPLINE");
+    spl_points_ = 0;
   }
 
   Vec3 printed(const Pose& pose) const {
@@ -246,22 +287,35 @@ class Emitter {
     return pose.translation().unaryExpr([digits](double v) { return rounded_decimal(v, digits); });
   }
 
-  void print_line_speed(const MachineMove& move) {
-    if (move.rapid || move.duration <= 0.0 || !started_) {
-      set("$VEL.CP", "SP_LINK", printed_cp_);
-      return set_orientation(orientation_limit_);
+  double length_to(const MachineMove& move) const {
+    return (printed(move.tool) - last_place_).norm();
+  }
+
+  // mm/s in m/s
+  static std::string speed_text(double speed) {
+    const double metres = speed * kMetresPerMillimetre;
+    return decimal(metres, decimals_of(metres));
+  }
+
+  // Returns the tip's speed as printed, mm/s; 0 when it is not stated.
+  double print_line_speed(const MachineMove& move, double time) {
+    if (move.rapid || time <= 0.0 || !started_) {
+      text_.set("$VEL.CP", "SP_LINK");
+      text_.set_orientation_speed(orientation_limit_);
+      return 0.0;
     }
-    const double length = (printed(move.tool) - last_place_).norm();
+    const double length = length_to(move);
     const double degrees = degrees_from_radians(turn(last_pose_, move.tool));
     if (length < kNoLength) {
-      if (degrees > 0.0) set_orientation(degrees / move.duration);
-      if (printed_cp_.empty() || printed_cp_ == "SP_LINK")
-        set("$VEL.CP", decimal(kLinkSpeed, 3), printed_cp_);
-      return;
+      if (degrees > 0.0) text_.set_orientation_speed(degrees / time);
+      const std::string last = text_.last("$VEL.CP");
+      if (last.empty() || last == "SP_LINK") text_.set("$VEL.CP", decimal(kLinkSpeed, 3));
+      return 0.0;
     }
-    const double speed = length / move.duration * kMetresPerMillimetre;
-    set("$VEL.CP", decimal(speed, decimals_of(speed)), printed_cp_);
-    set_orientation(orientation_limit_);
+    text_.set("$VEL.CP", speed_text(length / time));
+    text_.set_orientation_speed(orientation_limit_);
+    const double metres = length / time * kMetresPerMillimetre;
+    return rounded_decimal(metres, decimals_of(metres)) / kMetresPerMillimetre;
   }
 
   // PTP has no time: the share of the axes' speed with which the slowest takes the planned one.
@@ -275,10 +329,7 @@ class Emitter {
       }
       percent = std::clamp(std::floor(100.0 * needed), 1.0, kLinkPercent);
     }
-    const std::string value = decimal(percent, 0);
-    if (value == printed_percent_) return;
-    put_line("BAS(#VEL_PTP," + value + ")");
-    printed_percent_ = value;
+    text_.set_joint_percent(percent);
   }
 
   std::string joints_text(const MachineMove& move) const {
@@ -290,62 +341,26 @@ class Emitter {
       if (is_arm_axis(name) && move.to[j] < 0.0)
         turns[static_cast<std::size_t>('6' - name[1])] = '1';
       if (!(move.joints >> j & 1U)) continue;
-      text += (first ? "" : ",") + joint_text(j, move.to[j]);
+      text += (first ? "" : ",") + text_.joint(j, move.to[j]);
       first = false;
     }
     return text + "} ; T 'B" + turns + "'";
   }
 
-  std::string joint_text(int j, double value) const {
-    const auto& axis = machine_.axes[static_cast<std::size_t>(j)];
-    std::string text = axis.name + " ";
-    if (axis.joint.kind == JointKind::rotary)
-      append_decimal(text, degrees_from_radians(value), machine_.dialect.digits_angle);
-    else
-      append_decimal(text, value, machine_.dialect.digits_length);
-    return text;
-  }
-
-  std::string line_text(const MachineMove& move) {
-    std::string text = "LIN {" + pose_text(move.tool, machine_.dialect.digits_length);
-    for (int j = 0; j < machine_.size(); ++j)
-      if (is_external_axis(machine_.axes[static_cast<std::size_t>(j)].name))
-        text += "," + joint_text(j, move.to[j]);
-    text += "}";
-    if (blends()) text += " C_DIS";
-    return text;
-  }
-
-  std::string pose_text(const Pose& pose, int digits) {
-    std::string text;
-    const std::array<const char*, 3> names = {"X ", ",Y ", ",Z "};
-    for (std::size_t i = 0; i < 3; ++i) {
-      text += names[i];
-      append_decimal(text, pose.translation()[static_cast<Eigen::Index>(i)], digits);
-    }
-    const ZyxAngles angles = zyx_angles(pose.linear(), held_a_);
-    held_a_ = angles.z;
-    text += ",A " + decimal(degrees_from_radians(angles.z), angle_digits_);
-    text += ",B " + decimal(degrees_from_radians(angles.y), angle_digits_);
-    text += ",C " + decimal(degrees_from_radians(angles.x), angle_digits_);
-    return text;
-  }
-
   const MachineDefinition& machine_;
   const MachineProgram& program_;
   ScrewChain chain_;
-  int angle_digits_ = 5;
+  ProgramText text_;
   double orientation_limit_ = 0.0;
-  double held_a_ = 0.0;
+  bool rounds_ = false;  // some corner is rounded
   bool started_ = false;
+  std::size_t action_ = 0;  // the next one to print
   Pose last_pose_ = Pose::Identity();
   Vec3 last_place_ = Vec3::Zero();  // its tip, as printed
   JointVector last_joints_;
-  std::string printed_cp_;
-  std::string printed_orientation_;
-  std::string printed_percent_;
-  std::vector<std::string> pending_triggers_;
-  std::uint32_t line_ = 0;
+  std::vector<std::string> triggers_;  // at the start of the next motion
+  std::size_t spl_points_ = 0;         // of the open block
+  std::string block_speed_;
   EmittedProgram out_;
   Diagnostics diagnostics_;
 };
@@ -364,7 +379,7 @@ Result<EmittedProgram> emit(const MachineDefinition& machine, const MachineProgr
 
 const Dialect kDialect = {
     "krl",
-    "KUKA KRL (KSS 8), LIN in the part's frame and PTP, exact stop or C_DIS",
+    "KUKA KRL (KSS 8), LIN in the part's frame and PTP, exact stop, C_DIS or SPLINE",
     "LIN: tip linear, rotation in proportion ($ORI_TYPE=#VAR, set in the program), taken as one "
     "about "
     "a fixed axis with an allowance of the square of its angle by 8 for the control's own swivel "

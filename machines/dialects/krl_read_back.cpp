@@ -6,10 +6,17 @@
 #include "kernels/kinematics/screw_chain.h"
 #include "machines/dialects/event_text.h"
 #include "machines/dialects/krl.h"
+#include "machines/dialects/krl_line.h"
 
 namespace smoothpost::krl {
 
 namespace {
+
+/// An event on the way of a LIN.
+struct WayEvent {
+  double share = 0.0;  // of the LIN
+  const Statement* trigger = nullptr;
+};
 
 /// Follows the statements as KSS would, for one machine.
 class Reading {
@@ -24,7 +31,7 @@ class Reading {
   void run(const KrlProgram& program) {
     result.exact_path = true;
     for (const auto& s : program.statements) read(s);
-    if (!pending_.empty()) error(pending_.back(), "NC323", "a TRIGGER has no motion behind it");
+    if (!pending_.empty()) error(*pending_.back(), "NC323", "a TRIGGER has no motion behind it");
     result.line_count = program.line_count;
     result.last_line = program.end_line;
     result.part = base_;
@@ -51,9 +58,14 @@ class Reading {
   void read(const Statement& s) {
     switch (s.kind) {
       case Statement::Kind::motion:
-        return s.name == "LIN" ? read_line(s) : read_joints(s);
+        return s.name == "PTP" ? read_joints(s) : read_line(s);
+      case Statement::Kind::spline_begin:
+        block_speed_ = s.speed;
+        return;
+      case Statement::Kind::spline_end:
+        return;
       case Statement::Kind::trigger:
-        pending_.push_back(s);
+        pending_.push_back(&s);
         return;
       case Statement::Kind::wait_seconds:
         return add_event(s, "dwell", *s.number);
@@ -130,8 +142,12 @@ class Reading {
       (mode ? ipo_mode_ : ori_type_) = right;
       return true;
     }
-    if (s.name == "SP_LINK" || s.name == "$ADVANCE" || s.name == "$APO.CDIS" ||
-        s.name == "$APO.CORI") {
+    if (s.name == "$APO.CDIS") {
+      cdis_ = s.number;
+      if (!(cdis_.value_or(-1.0) >= 0.0)) error(s, "NC323", "$APO.CDIS needs a number from 0 on");
+      return true;
+    }
+    if (s.name == "SP_LINK" || s.name == "$ADVANCE" || s.name == "$APO.CORI") {
       if (!s.number) error(s, "NC323", s.name + " needs a number");
       return true;
     }
@@ -198,29 +214,67 @@ class Reading {
   void begin_motion(const Statement& s, ReadBackMove& move) {
     if (ended_) error(s, "NC323", "a motion stands behind the last lines of the machine file");
     if (!base_ || !tool_) moved_without_frames_ = true;
-    if (!s.blend.empty()) result.exact_path = false;
-    for (const auto& trigger : pending_) read_trigger(trigger);
-    pending_.clear();
     move.line = s.line;
-    move.beam = beam_;
     move.to = JointVector::Zero(machine_.size());
   }
 
+  // Events at the start point.
+  void start_triggers(ReadBackMove& move) {
+    for (const Statement* trigger : pending_) {
+      if (trigger->distance != 0) continue;
+      if (trigger->path != 0.0 || trigger->number != 0.0)
+        error(*trigger, "NC323",
+              "a TRIGGER at the start of a motion has another DELAY or PATH than 0");
+      read_trigger(*trigger);
+    }
+    move.beam = beam_;
+  }
+
   void read_trigger(const Statement& s) {
-    if (s.distance != 0 || s.number != 0.0)
-      return error(s, "NC323", "only DISTANCE=0 DELAY=0 is one of ours");
     if (const auto event = events_.find(s.body, EventReader::Place::on_the_fly))
       return add_event(s, *event, 0.0);
     error(s, "NC323", "the machine's process table has no event for " + s.body.substr(0, 64));
   }
 
+  // Events before the end point, in the order in which they happen.
+  std::vector<WayEvent> way_triggers(const ReadBackMove& move) {
+    std::vector<WayEvent> events;
+    for (const Statement* trigger : pending_) {
+      if (trigger->distance == 0) continue;
+      const double delay = *trigger->number;
+      if (delay > 0.0 || trigger->path > 0.0 || (delay == 0.0 && trigger->path == 0.0)) {
+        error(*trigger, "NC323", "a TRIGGER at the end of a motion needs a DELAY or PATH below 0");
+        continue;
+      }
+      const double length = pose_ ? (move.tool.translation() - pose_->translation()).norm() : 0.0;
+      if (move.spline || !(move.duration > 0.0) || !(length > 0.0)) {
+        error(*trigger, "NC323", "this TRIGGER needs a LIN with a way and a speed");
+        continue;
+      }
+      constexpr double kMillisecondsPerSecond = 1e3;
+      const double share =
+          1.0 + delay / kMillisecondsPerSecond / move.duration + trigger->path / length;
+      if (share <= 0.0)
+        error(*trigger, "NC323", "this TRIGGER would stand before the motion that it belongs to");
+      events.push_back({share, trigger});
+    }
+    std::stable_sort(events.begin(), events.end(),
+                     [](const WayEvent& a, const WayEvent& b) { return a.share < b.share; });
+    return events;
+  }
+
   void read_joints(const Statement& s) {
     ReadBackMove move;
     begin_motion(s, move);
+    if (!s.blend.empty() || rounds_) result.exact_path = false;
+    rounds_ = false;
     if (!take_joints(s, move)) return;
     move.to = joints_;
     move.known = known_;
     move.rapid = true;
+    way_triggers(move);
+    start_triggers(move);
+    pending_.clear();
     const JointMask all = (1U << machine_.size()) - 1U;
     pose_.reset();
     if (known_ == all && base_ && tool_) {
@@ -231,37 +285,87 @@ class Reading {
     result.moves.push_back(std::move(move));
   }
 
+  // LIN or SPL.
   void read_line(const Statement& s) {
     if (!base_ || !tool_ || !ipo_mode_ || !ori_type_)
-      return error(s, "NC323", "LIN stands before $BASE, $TOOL, $IPO_MODE and $ORI_TYPE are set");
+      return error(s, "NC323",
+                   s.name + " stands before $BASE, $TOOL, $IPO_MODE and $ORI_TYPE are set");
     ReadBackMove move;
     begin_motion(s, move);
     if (s.aggregate.find("S") || s.aggregate.find("T"))
-      return error(s, "NC323", "S and T have no meaning in LIN");
+      return error(s, "NC323", "S and T have no meaning in " + s.name);
+    const JointVector from = joints_;
+    const JointMask known_from = known_;
     if (!take_joints(s, move)) return;
     move.interpolation = MoveInterpolation::tool;
     move.tool = pose_of(s.aggregate);
+    move.spline = s.name == "SPL";
     for (int j = 0; j < machine_.size(); ++j)
       if (machine_.axes[static_cast<std::size_t>(j)].name[0] == 'A') known_ &= ~(1U << j);
     move.known = known_;
+    set_blend(s, move);
     set_time(s, move);
+    add_line(move, from, known_from);
     pose_ = move.tool;
-    result.moves.push_back(std::move(move));
+  }
+
+  void set_blend(const Statement& s, ReadBackMove& move) {
+    rounds_ = !s.blend.empty();
+    if (!rounds_) return;
+    if (s.blend != "C_DIS") {
+      result.exact_path = false;
+    } else if (!cdis_) {
+      error(s, "NC323", "C_DIS stands before $APO.CDIS is set");
+    } else {
+      move.blend = *cdis_;
+    }
+  }
+
+  // The LIN, in pieces where events happen on the way.
+  void add_line(const ReadBackMove& whole, const JointVector& from, JointMask known_from) {
+    const std::vector<WayEvent> events = way_triggers(whole);
+    ReadBackMove rest = whole;
+    start_triggers(rest);
+    pending_.clear();
+    double done = 0.0;
+    for (const WayEvent& event : events) {
+      if (event.share > done && pose_) {
+        if (whole.known & ~known_from)
+          return error(*event.trigger, "NC323", "this TRIGGER needs a known start of every axis");
+        ReadBackMove piece = rest;
+        piece.tool = line_pose(*pose_, whole.tool, event.share);
+        for (int j = 0; j < machine_.size(); ++j)
+          if (whole.known >> j & 1U) piece.to[j] = from[j] + event.share * (whole.to[j] - from[j]);
+        piece.duration = (event.share - done) * whole.duration;
+        piece.blend = 0.0;
+        result.moves.push_back(std::move(piece));
+        done = event.share;
+      }
+      read_trigger(*event.trigger);
+      rest.beam = beam_;
+    }
+    rest.duration = (1.0 - done) * whole.duration;
+    result.moves.push_back(std::move(rest));
   }
 
   // The slowest of path, swivel and rotation decides; each of the latter is at most the whole turn.
   void set_time(const Statement& s, ReadBackMove& move) {
-    move.rapid = link_speed_;
-    if (link_speed_ && ori1_ > 0.0 && ori2_ > 0.0) return;
-    if (ori1_ <= 0.0 || ori2_ <= 0.0 || cp_ <= 0.0)
-      return error(s, "NC323", "LIN stands before $VEL.CP, $VEL.ORI1 and $VEL.ORI2 are set");
+    const std::optional<double> own = !move.spline ? std::nullopt
+                                      : s.speed    ? s.speed
+                                                   : block_speed_;
+    move.rapid = link_speed_ && !own;
+    if (move.rapid && ori1_ > 0.0 && ori2_ > 0.0) return;
+    const double cp = own.value_or(cp_);
+    if (ori1_ <= 0.0 || ori2_ <= 0.0 || cp <= 0.0)
+      return error(s, "NC323", s.name + " stands before $VEL.CP, $VEL.ORI1 and $VEL.ORI2 are set");
     if (!pose_)
-      return error(s, "NC323", "a LIN with a programmed speed starts at an unknown place");
+      return error(s, "NC323",
+                   "a " + s.name + " with a programmed speed starts at an unknown place");
     const double length = (move.tool.translation() - pose_->translation()).norm();
     const double degrees =
         degrees_from_radians(rotation_log(pose_->linear().transpose() * move.tool.linear()).norm());
     constexpr double kMillimetresPerMetre = 1e3;
-    const double path = length / (cp_ * kMillimetresPerMetre);
+    const double path = length / (cp * kMillimetresPerMetre);
     move.duration = std::max(path, degrees / std::min(ori1_, ori2_));
   }
 
@@ -277,11 +381,14 @@ class Reading {
   std::vector<std::string> start_lines_;
   std::vector<std::string> end_lines_;
   bool ended_ = false;
-  std::vector<Statement> pending_;  // triggers of the next motion
+  std::vector<const Statement*> pending_;  // triggers of the next motion
   std::optional<Pose> base_;
   std::optional<Pose> tool_;
   std::optional<Pose> pose_;
   double tool_length_ = 0.0;
+  std::optional<double> cdis_;
+  std::optional<double> block_speed_;  // of the open SPLINE
+  bool rounds_ = false;                // at the end of the last motion
   double cp_ = 0.0;
   double ori1_ = 0.0;
   double ori2_ = 0.0;

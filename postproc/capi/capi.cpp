@@ -71,6 +71,8 @@ Options options_of(const smoothpost_options& o) {
   out.schedule = text(o.schedule);
   out.links = text(o.links);
   out.cuts = text(o.cuts);
+  out.box = text(o.box);
+  out.turn = text(o.turn);
   out.against = text(o.against);
   out.json = text(o.json);
   out.report = text(o.report);

@@ -99,6 +99,8 @@ struct CallOptions {
     c.schedule = or_null(l.schedule);
     c.links = or_null(l.links);
     c.cuts = or_null(l.cuts);
+    c.box = or_null(l.box);
+    c.turn = or_null(l.turn);
     c.against = or_null(l.against);
     c.json = or_null(l.json);
     c.report = or_null(l.report);

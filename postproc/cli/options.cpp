@@ -36,7 +36,8 @@ void add_part_options(CLI::App* app, CommandLine& l) {
   app->add_option("-w,--workpiece", l.workpiece, "the part: an STL in the program's coordinates");
   app->add_option("--workpiece-unit", l.workpiece_unit, "unit of the STL: mm | inch");
   app->add_option("--work-offset", l.work_offset,
-                  "G54=x,y,z[,a,b,c]: the program's zero on the output machine, mm and deg")
+                  "G54=x,y,z[,a,b,c]: the program's zero on the output machine, mm and deg; convert: "
+                  "auto finds it")
       ->take_all()
       ->allow_extra_args(false);
 }
@@ -63,6 +64,13 @@ void add_input_options(CLI::App* app, CommandLine& l) {
   app->add_option("--axis-tolerance", l.axis_tolerance, "deg");
 }
 
+void add_search_options(CLI::App* app, CommandLine& l) {
+  app->add_option("--box", l.box,
+                  "x0,y0,z0,x1,y1,z1: where the program's zero may lie, in the coordinates of "
+                  "--work-offset, mm; default: all that the machine reaches");
+  app->add_option("--turn", l.turn, "largest turn about the vertical either way, deg; default 180");
+}
+
 void add_convert(CLI::App& app, CommandLine& l) {
   auto* c = app.add_subcommand("convert", "a CAM program to a certified machine program");
   c->footer(kExample);
@@ -70,6 +78,7 @@ void add_convert(CLI::App& app, CommandLine& l) {
   add_machine_options(c, l);
   c->add_option("-o,--output", l.output, "the program; - for standard output");
   add_part_options(c, l);
+  add_search_options(c, l);
   c->add_option("--dialect", l.dialect, "output dialect instead of the machine's");
   add_input_options(c, l);
   c->add_option("--lead", l.lead, "freedom of the tool axis, deg");
@@ -86,6 +95,20 @@ void add_convert(CLI::App& app, CommandLine& l) {
   c->add_option("--line-map", l.line_map, "write output line -> input line to FILE.json");
   c->add_flag("--no-collision-check", l.no_collision_check, "this version makes none");
   c->add_flag("--force", l.force, "write a refused program too, marked NOT CERTIFIED");
+  add_output_options(c, l);
+}
+
+void add_place(CLI::App& app, CommandLine& l) {
+  auto* c = app.add_subcommand("place", "where to put the part: prints a --work-offset");
+  c->add_option("input", l.input, "NC program or CSV; - for standard input")->required();
+  add_machine_options(c, l);
+  add_part_options(c, l);
+  add_search_options(c, l);
+  c->add_option("--dialect", l.dialect, "output dialect instead of the machine's");
+  add_input_options(c, l);
+  c->add_option("--smoothing", l.smoothing, "as for convert");
+  c->add_option("--links", l.links, "plan | keep, as for convert");
+  c->add_option("--cuts", l.cuts, "7, 7-40 or 7-: only these cuts count");
   add_output_options(c, l);
 }
 
@@ -123,6 +146,7 @@ Parsed parse_command_line(int argc, char** argv) {
   app.require_subcommand(1);
   add_convert(app, l);
   add_check(app, l);
+  add_place(app, l);
   auto* machines =
       add_words(app, l, "machines", "list | show NAME | validate FILE | test-program NAME");
   machines->add_option("-o,--output", l.output, "test-program: the program; - for standard output");

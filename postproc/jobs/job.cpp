@@ -13,6 +13,7 @@
 #include "postproc/jobs/files.h"
 #include "postproc/jobs/golden.h"
 #include "postproc/jobs/machine_commands.h"
+#include "postproc/jobs/place.h"
 #include "postproc/jobs/settings.h"
 #include "postproc/pipeline/convert.h"
 #include "postproc/pipeline/hash.h"
@@ -43,18 +44,14 @@ class Run {
   JobResult convert_command() {
     if (!refuse_later_options() || !load_output_machine() || !load_input()) return finish();
     ConvertInput in;
-    if (!read_program(in) || !place(in) || !read_part(in.part, in.part_name)) return finish();
-    in.keep_links = options_.links == "keep";
-    if (!options_.cuts.empty()) {
-      const auto cuts = parse_cut_range(options_.cuts);
-      add(cuts.diagnostics());
-      if (!cuts.ok()) return finish();
-      in.cuts = cuts.value();
-    }
-    in.machine = machine_.definition;
-    in.input_name = input_name_;
-    in.title = title(in);
-    const Conversion conversion = convert(in, options_.force, progress_);
+    if (!read_convert_input(in)) return finish();
+    std::optional<Conversion> made;
+    if (automatic())
+      made = convert_at_best_place(in, options_.force);
+    else
+      made = convert(in, options_.force, progress_);
+    if (!made) return finish();
+    const Conversion& conversion = *made;
     const ScrewChain chain = placed(in.placement);
     const double tool_length = in.input.path.points.front().tool_length;
     context_.cutter_locations = in.input.path.points.size();
@@ -65,6 +62,16 @@ class Run {
     result_.line_map = line_map_json(conversion.line_map, base_name(input_name_));
     if (conversion.verdict == Verdict::certified || conversion.verdict == Verdict::forced)
       result_.program = conversion.program;
+    return finish();
+  }
+
+  JobResult place_command() {
+    if (!refuse_later_options() || !load_output_machine() || !load_input()) return finish();
+    ConvertInput in;
+    if (!read_convert_input(in)) return finish();
+    context_.cutter_locations = in.input.path.points.size();
+    context_.input_lines = in.input.lines;
+    if (const auto conversion = convert_at_best_place(in, false)) report(*conversion);
     return finish();
   }
 
@@ -158,6 +165,64 @@ class Run {
     context_.version = kVersion;
     context_.timings = options_.timings;
     return true;
+  }
+
+  bool automatic() const {
+    return options_.work_offset.size() == 1 && options_.work_offset.front() == "auto";
+  }
+
+  bool read_convert_input(ConvertInput& in) {
+    if (!read_program(in) || !place(in) || !read_part(in.part, in.part_name)) return false;
+    in.keep_links = options_.links == "keep";
+    if (!options_.cuts.empty()) {
+      const auto cuts = parse_cut_range(options_.cuts);
+      add(cuts.diagnostics());
+      if (!cuts.ok()) return false;
+      in.cuts = cuts.value();
+    }
+    in.machine = machine_.definition;
+    in.input_name = input_name_;
+    in.title = title(in);
+    return true;
+  }
+
+  /// Of the places that the search finds the best that gives a certified program; `in` is then
+  /// placed there. With `force` the best place, when none does.
+  std::optional<Conversion> convert_at_best_place(ConvertInput& in, bool force) {
+    const auto wanted = read_place_options(options_);
+    add(wanted.diagnostics());
+    if (!wanted.ok()) return {};
+    PlaceInput search{in.input, in.machine, in.placement, {}, wanted.value().box,
+                      wanted.value().turn};
+    search.links = {in.keep_links, in.machine.links.micro_joint, in.cuts};
+    const auto places = find_places(search, progress_);
+    for (auto d : places.diagnostics()) {
+      if (d.where.file.empty()) d.where.file = input_name_;
+      add(std::move(d));
+    }
+    if (!places.ok()) return {};
+    const int system = in.input.system;
+    const auto convert_at = [&](const FoundPlace& place, bool forced) {
+      in.placement = place.placement;
+      in.placement_text = placement_sentence({system, place.position, place.turn}) +
+                          ", a place that smoothpost has found: the part has to stand there";
+      in.title = title(in);
+      return convert(in, forced, progress_);
+    };
+    const auto placed = first_certified(
+        places.value(), system, [&](const FoundPlace& place) { return convert_at(place, false); });
+    for (auto d : placed.diagnostics()) {
+      if (d.where.file.empty()) d.where.file = input_name_;
+      add(std::move(d));
+    }
+    std::optional<std::size_t> place;
+    if (placed.ok()) place = placed.value().place;
+    context_.placement = placement_report(places.value(), place, system);
+    if (!placed.ok())
+      return force ? std::optional<Conversion>(convert_at(places.value().best.front(), true))
+                   : std::nullopt;
+    if (options_.command == "place") result_.text = place_text(places.value(), *place, system);
+    return placed.value().conversion;
   }
 
   bool read_program(ConvertInput& in) {
@@ -255,15 +320,11 @@ class Run {
     return true;
   }
 
-  static std::string system_name(int system) {
-    return system <= 6 ? "G" + std::to_string(53 + system) : "G59." + std::to_string(system - 6);
-  }
-
   // Where the program's zero lies on the output machine. `system`: the one that the program uses.
   std::optional<Pose> read_placement(std::optional<int> system) {
-    if (options_.work_offset.size() == 1 && options_.work_offset.front() == "auto") {
-      add(usage_error("US122",
-                      "--work-offset auto is not possible in this version: give G54=x,y,z"));
+    if (automatic()) {
+      if (options_.command == "convert") return Pose::Identity();
+      add(usage_error("US122", "--work-offset auto is for convert alone: give G54=x,y,z"));
       return {};
     }
     const auto offsets = read_offsets(options_.work_offset, "--work-offset");
@@ -285,13 +346,7 @@ class Run {
     const OffsetOption& o = offsets.value().front();
     placement.translation() = o.position;
     placement.linear() = rotation_from_rpy(o.turn.x(), o.turn.y(), o.turn.z());
-    placement_text_ = "the program's zero lies at " + decimal(o.position.x(), 4) + ", " +
-                      decimal(o.position.y(), 4) + ", " + decimal(o.position.z(), 4) +
-                      " mm in the machine's workpiece frame";
-    if (o.turn.norm() > 0.0)
-      placement_text_ += ", turned by " + decimal(degrees_from_radians(o.turn.x()), 4) + ", " +
-                         decimal(degrees_from_radians(o.turn.y()), 4) + ", " +
-                         decimal(degrees_from_radians(o.turn.z()), 4) + " deg about X, Y, Z";
+    placement_text_ = placement_sentence(o);
     return placement;
   }
 
@@ -455,6 +510,7 @@ class Run {
 JobResult dispatch(const Options& options, const Progress& progress) {
   if (options.command == "convert") return Run(options, progress).convert_command();
   if (options.command == "check") return Run(options, progress).check_command();
+  if (options.command == "place") return Run(options, progress).place_command();
   if (options.command == "machines") return run_machines_command(options);
   if (options.command == "formats") return run_formats_command(options);
   if (options.command == "golden") return run_golden_command(options, progress);
@@ -462,7 +518,7 @@ JobResult dispatch(const Options& options, const Progress& progress) {
   result.status = ExitStatus::usage;
   result.diagnostics.push_back(usage_error(
       "US100",
-      "unknown command \"" + options.command + "\": convert, check, machines, formats or golden"));
+      "unknown command \"" + options.command + "\": convert, check, place, machines, formats or golden"));
   return result;
 }
 

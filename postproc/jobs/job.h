@@ -18,10 +18,10 @@ struct JobResult {
   std::string verdict;
   std::string program;       ///< empty unless certified or forced
   std::string program_path;  ///< where it was written; empty: nowhere
-  std::string report;        ///< JSON, for convert and check
+  std::string report;        ///< JSON, for convert, check and place
   std::string line_map;      ///< JSON, for convert
   std::string trajectory;    ///< CSV, when options.trajectory
-  std::string text;          ///< for people: machines, formats, golden
+  std::string text;          ///< for people: place, machines, formats, golden
   std::string summary;       ///< one line: verdict, checks, time
   Diagnostics diagnostics;
 };

@@ -34,6 +34,8 @@ const std::map<std::string, std::string Options::*>& text_options() {
       {"schedule", &Options::schedule},
       {"links", &Options::links},
       {"cuts", &Options::cuts},
+      {"box", &Options::box},
+      {"turn", &Options::turn},
       {"against", &Options::against},
       {"json", &Options::json},
       {"report", &Options::report},

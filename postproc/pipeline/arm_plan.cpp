@@ -14,8 +14,9 @@ namespace smoothpost {
 
 namespace {
 
-constexpr double kAxisStep = 2.0 * kRadiansPerDegree;  // between tracked points
-constexpr double kTipStep = 25.0;                      // mm
+constexpr double kAxisStep = 2.0 * kRadiansPerDegree;      // between tracked points
+constexpr double kTipStep = 25.0;                          // mm
+constexpr double kLongestTurn = 45.0 * kRadiansPerDegree;  // of a joint on one tool move
 constexpr int kMaxSplits = 30;
 constexpr int kCloser = 16;  // parts of a motion that is looked at more closely
 constexpr int kCloserLooks = 2;
@@ -30,20 +31,18 @@ Mat3 least_rotation(const Vec3& a, const Vec3& b) {
 
 class ArmPlanner {
  public:
-  ArmPlanner(const ReferencePath& reference, const SixR& arm, const Inverse& inverse,
+  ArmPlanner(const SmoothedPath& path, const SixR& arm, const Inverse& inverse,
              const JointPlanSettings& settings, const Progress& progress)
-      : reference_(reference),
-        arm_(arm),
-        inverse_(inverse),
-        settings_(settings),
-        progress_(progress) {}
+      : path_(path), arm_(arm), inverse_(inverse), settings_(settings), progress_(progress) {}
 
   /// With the first spin, best first, that has a way without a split; as the best one ends if none.
   Result<JointPlan> run() {
     collect();
     choose_reference_axis();
-    const std::vector<double> spins =
-        settings_.spin ? std::vector<double>{*settings_.spin} : spins_by_score();
+    from_input_ = input_tool_rotation(arm_.chain().tool_axis, settings_.spin);
+    const std::vector<double> spins = settings_.spin || settings_.whole_rotation
+                                          ? std::vector<double>{settings_.spin.value_or(0.0)}
+                                          : spins_by_score();
     std::optional<Result<JointPlan>> first;
     for (const double spin : spins) {
       Result<JointPlan> plan = plan_with(spin);
@@ -63,7 +62,8 @@ class ArmPlanner {
     JointPlan plan;
     if (tracking.status == BranchTracking::Status::rewind_needed && settings_.may_split) {
       for (const auto& rewind : tracking.rewinds)
-        plan.splits.push_back({tracked_[rewind.point - 1].segment, tracked_[rewind.point - 1].s});
+        plan.splits.push_back(
+            path_.place(tracked_[rewind.point - 1].segment, tracked_[rewind.point - 1].s));
       return Result<JointPlan>(std::move(plan));
     }
     if (tracking.status != BranchTracking::Status::ok)
@@ -81,8 +81,13 @@ class ArmPlanner {
       const JointSample& before = tracked_[rewind->point - 1];
       const double from = before.segment == to.segment ? before.s : 0.0;
       std::vector<JointSample> between;
-      for (int k = 1; k < kCloser; ++k)
-        between.push_back({to.segment, from + (to.s - from) * k / kCloser, 0, {}});
+      for (int k = 1; k < kCloser; ++k) {
+        JointSample sample;
+        sample.segment = to.segment;
+        sample.s = from + (to.s - from) * k / kCloser;
+        sample.guide = true;
+        between.push_back(std::move(sample));
+      }
       tracked_.insert(tracked_.begin() + static_cast<std::ptrdiff_t>(rewind->point),
                       between.begin(), between.end());
     }
@@ -111,32 +116,41 @@ class ArmPlanner {
       }
     }
     JointPlan plan;
+    if (settings_.tool_moves)
+      drop_guides(samples_, [this](const JointSample& a, const JointSample& b) {
+        return (a.q - b.q).cwiseAbs().maxCoeff() < kLongestTurn && follows(a, b);
+      });
+    for (JointSample& sample : samples_) {
+      const PathPlace on_input = path_.place(sample.segment, sample.s);
+      sample.segment = on_input.segment;
+      sample.s = on_input.s;
+    }
     plan.samples = std::move(samples_);
     return Result<JointPlan>(std::move(plan));
   }
 
   bool replanned(std::size_t segment) const {
-    return segment > 0 && reference_.path().points[segment].replanned;
+    return segment > 0 && path_.point(segment).replanned;
   }
-  std::uint32_t line_at(std::size_t segment) const {
-    return reference_.path().points[segment].line;
-  }
+  std::uint32_t line_at(std::size_t segment) const { return path_.point(segment).line; }
   std::uint32_t line_of(std::size_t tracked) const { return line_at(tracked_[tracked].segment); }
 
-  CutterLocation location(std::size_t segment, double s) const {
-    return segment == 0 ? reference_.path().points[0].location : reference_.at(segment, s);
-  }
+  CutterLocation location(std::size_t segment, double s) const { return path_.at(segment, s); }
 
   void add(std::size_t segment, double s) {
-    tracked_.push_back({static_cast<std::uint32_t>(segment), s, 0, {}});
+    JointSample sample;
+    sample.segment = static_cast<std::uint32_t>(segment);
+    sample.s = s;
+    tracked_.push_back(std::move(sample));
   }
 
   void collect() {
-    if (reference_.segments() == 0 || !replanned(1)) add(0, 1.0);
-    for (std::size_t k = 1; k <= reference_.segments(); ++k) {
-      if (!replanned(k))
-        subdivide(k, 0.0, 1.0, 0);
-      else if (k < reference_.segments() && !replanned(k + 1))
+    if (path_.legs() == 0 || !replanned(1)) add(0, 1.0);
+    for (std::size_t k = 1; k <= path_.legs(); ++k) {
+      if (!replanned(k)) {
+        const std::vector<double> breaks = path_.breaks(k);
+        for (std::size_t b = 1; b < breaks.size(); ++b) subdivide(k, breaks[b - 1], breaks[b], 0);
+      } else if (k < path_.legs() && !replanned(k + 1))
         add(k, 1.0);
     }
   }
@@ -144,13 +158,14 @@ class ArmPlanner {
   void subdivide(std::size_t segment, double from, double to, int depth) {
     const CutterLocation a = location(segment, from);
     const CutterLocation b = location(segment, to);
-    const auto bend = reference_.second_derivative_bound(segment);
+    const auto bend = path_.second_derivative_bound(segment, from, to);
     const double span = to - from;
     const bool turns = std::sqrt(bend.axis) * span > kAxisStep;
     const bool bends = span * span * bend.tip / 8.0 > kTipStep;
     if (depth < kMaxSplits && (turns || bends || (a.tip - b.tip).norm() > kTipStep)) {
       const double mid = 0.5 * (from + to);
       subdivide(segment, from, mid, depth + 1);
+      tracked_.back().guide = true;
       subdivide(segment, mid, to, depth + 1);
       return;
     }
@@ -178,10 +193,13 @@ class ArmPlanner {
   Pose holder(std::size_t segment, double s, double spin) const {
     const CutterLocation at = location(segment, s);
     Pose pose = Pose::Identity();
-    pose.linear() =
-        least_rotation(reference_axis_, at.axis) * rotation_about(reference_axis_, spin) * home_;
+    if (settings_.whole_rotation)
+      pose.linear() = path_.rotation_at(segment, s) * from_input_.transpose();
+    else
+      pose.linear() =
+          least_rotation(reference_axis_, at.axis) * rotation_about(reference_axis_, spin) * home_;
     pose.translation() = at.tip;
-    return holder_pose(arm_.chain(), pose, reference_.path().points[segment].tool_length);
+    return holder_pose(arm_.chain(), pose, path_.point(segment).tool_length);
   }
 
   BranchTracking track(const std::vector<JointSample>& samples, double spin) const {
@@ -269,12 +287,12 @@ class ArmPlanner {
 
   bool follows(const JointSample& from, const JointSample& to) const {
     const ScrewChain& chain = arm_.chain();
-    const double length = reference_.path().points[to.segment].tool_length;
+    const double length = path_.point(to.segment).tool_length;
     const Pose a = tip_pose(chain, from.q, length);
     const Pose b = tip_pose(chain, to.q, length);
     const double allowance = settings_.tool_moves ? turn_allowance(a, b, ToolTurn::slerp) : 0.0;
     for (const double t : {0.25, 0.5, 0.75}) {
-      const CutterLocation wanted = reference_.at(to.segment, from.s + t * (to.s - from.s));
+      const CutterLocation wanted = path_.at(to.segment, from.s + t * (to.s - from.s));
       const Pose pose = settings_.tool_moves
                             ? tool_motion(a, b, t, ToolTurn::slerp, chain.tool_axis)
                             : tip_pose(chain, from.q + t * (to.q - from.q), length);
@@ -286,12 +304,13 @@ class ArmPlanner {
     return true;
   }
 
-  const ReferencePath& reference_;
+  const SmoothedPath& path_;
   const SixR& arm_;
   const Inverse& inverse_;
   const JointPlanSettings& settings_;
   const Progress& progress_;
   Vec3 reference_axis_ = Vec3::UnitZ();
+  Mat3 from_input_ = Mat3::Identity();
   Mat3 home_ = Mat3::Identity();  ///< rotation with the tool along the reference axis, ψ = 0
   double spin_ = 0.0;
   bool cancelled_ = false;
@@ -301,10 +320,10 @@ class ArmPlanner {
 
 }  // namespace
 
-Result<JointPlan> plan_arm(const ReferencePath& reference, const SixR& arm,
+Result<JointPlan> plan_arm(const SmoothedPath& path, const SixR& arm,
                            const JointPlanSettings& settings, const Progress& progress) {
   const auto inverse = Inverse::from(arm.chain());
-  return ArmPlanner(reference, arm, *inverse, settings, progress).run();
+  return ArmPlanner(path, arm, *inverse, settings, progress).run();
 }
 
 }  // namespace smoothpost

@@ -5,7 +5,7 @@
 
 namespace smoothpost {
 
-/// Joint values of a six-axis arm along the reference path: plan_joints() for arms.
+/// Joint values of a six-axis arm along the path: plan_joints() for arms.
 ///
 /// A cutter location leaves the rotation about the tool axis free. It is fixed by one angle ψ for
 /// the whole path: R = M(a → n) · Rot(a, ψ) · M(h → a) · R_home, where n is the tool axis, h the
@@ -14,7 +14,7 @@ namespace smoothpost {
 /// from a singular wrist on a thinned path and has a way along the whole one. Samples lie so close
 /// that the motion between them (straight joints, or tip linear and slerp with settings.tool_moves)
 /// stays inside the tolerances. Failures and splits as plan_joints().
-Result<JointPlan> plan_arm(const ReferencePath& reference, const SixR& arm,
+Result<JointPlan> plan_arm(const SmoothedPath& path, const SixR& arm,
                            const JointPlanSettings& settings, const Progress& progress);
 
 }  // namespace smoothpost

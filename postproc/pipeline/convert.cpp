@@ -7,6 +7,7 @@
 
 #include "kernels/core/units.h"
 #include "postproc/pipeline/arm_plan.h"
+#include "postproc/pipeline/controller_blending.h"
 #include "postproc/pipeline/conversion_parts.h"
 #include "postproc/pipeline/joint_plan.h"
 #include "postproc/pipeline/machine_program.h"
@@ -121,7 +122,6 @@ class Converter {
           "US120",
           key + " = \"" + value + "\" is not possible in this version; possible: " + possible));
     };
-    if (r.smoothing != "none") refuse("recipe.smoothing", r.smoothing, "none");
     if (r.orientation != "programmed") refuse("recipe.orientation", r.orientation, "programmed");
     if (r.optimise != "none") refuse("recipe.optimise", r.optimise, "none");
     if (r.schedule != "programmed") refuse("recipe.schedule", r.schedule, "programmed");
@@ -140,9 +140,45 @@ class Converter {
              "tcp (between the ends of its joint moves nothing is known of this controller)");
     if (in_.machine.dialect.mode == "tcp" && turn_ == ToolTurn::none)
       refuse("dialect.mode", "tcp", "joint (this dialect has no tool-centre-point mode)");
-    if (in_.machine.dialect.path_mode != "exact")
-      refuse("dialect.path_mode", in_.machine.dialect.path_mode, "exact");
+    if (in_.machine.dialect.path_mode != "exact" && turn_ != ToolTurn::slerp)
+      refuse("dialect.path_mode", in_.machine.dialect.path_mode,
+             "exact (the rounding of this control has no bound that is known)");
+    smoothing_is_possible(refuse);
     return !has_error(out_.diagnostics);
+  }
+
+  template <class Refuse>
+  void smoothing_is_possible(const Refuse& refuse) {
+    const auto& r = in_.machine.recipe;
+    const auto& budget = in_.machine.tolerance.budget;
+    if (r.smoothing != "none" && budget.smoothing <= 0.0)
+      refuse("tolerance.budget.smoothing", "0", "a share above 0 when recipe.smoothing is on");
+    if (r.kappa < 0.4 || r.kappa > 0.6 || r.lambda < -0.5 || r.lambda > 2.5)
+      refuse("recipe.kappa and lambda", number(r.kappa) + ", " + number(r.lambda),
+             "0.4 to 0.6 and -0.5 to 2.5 (beyond, the curve runs backwards)");
+    if (r.task == "pose" && !in_.input.path.full_pose)
+      refuse("recipe.task", "pose",
+             "axis (this input gives tool axes only; CSV with qw,qx,qy,qz or rz,ry,rx has whole "
+             "rotations)");
+    if (r.task == "pose" && in_.machine.recipe.kind != "robot")
+      refuse("recipe.task", "pose", "axis (five axes cannot set the rotation about the tool)");
+  }
+
+  SmoothedPath smoothed() const {
+    const auto& r = in_.machine.recipe;
+    if (r.smoothing == "none") return SmoothedPath(reference_);
+    const auto& tolerance = in_.machine.tolerance;
+    SmoothingSettings s;
+    s.kind = r.smoothing == "acr" ? BlendKind::acr : BlendKind::ramp;
+    s.shape = {r.kappa, r.lambda};
+    s.paper_shape = r.shape == "paper";
+    s.ramp_c1 = r.ramp_c1;
+    s.merge_tip = tolerance.tip * tolerance.budget.merge;
+    s.merge_axis = tolerance.axis * tolerance.budget.merge;
+    s.corner_tip = tolerance.tip * tolerance.budget.smoothing;
+    s.corner_axis = tolerance.axis * tolerance.budget.smoothing;
+    s.whole_rotation = r.task == "pose";
+    return SmoothedPath(reference_, cuts_, s);
   }
 
   bool has_cuts() {
@@ -231,6 +267,7 @@ class Converter {
     settings.may_split = in_.machine.links.rewind_in_cut;
     settings.tool_moves = turn_ != ToolTurn::none;
     settings.spin = in_.machine.recipe.spin;
+    settings.whole_rotation = in_.machine.recipe.task == "pose";
     auto planned = plan_with(settings);
     // The second half starts a little before the place, so that it may need a split of its own.
     for (int round = 1; planned.ok() && !planned.value().splits.empty(); ++round) {
@@ -243,9 +280,10 @@ class Converter {
     watch_.lap("kinematics");
     if (!planned.ok()) return false;
     BuiltProgram built =
-        build_program({path_, cuts_, in_.machine, chain_, part_box(), turn_, &*inverse_},
+        build_program({reference_, cuts_, in_.machine, chain_, part_box(), turn_, &*inverse_},
                       planned.value().samples);
     program_ = std::move(built.program);
+    plan_blending(program_, in_.machine, chain_);
     if (!built.cramped.empty()) {
       out_.diagnostics.push_back(diagnostic(
           "LK104",
@@ -290,10 +328,15 @@ class Converter {
     return true;
   }
 
-  Result<JointPlan> plan_with(const JointPlanSettings& settings) const {
+  Result<JointPlan> plan_with(const JointPlanSettings& settings) {
+    const SmoothedPath path = smoothed();
+    watch_.lap("smooth");
+    out_.corners = path.corners();
+    out_.merged_points = path.merged_points();
+    watch_.lap("corners");
     if (const RotaryPair* pair = inverse_->rotary_pair())
-      return plan_joints(reference_, *pair, settings, progress_);
-    return plan_arm(reference_, *inverse_->six_r(), settings, progress_);
+      return plan_joints(path, *pair, settings, progress_);
+    return plan_arm(path, *inverse_->six_r(), settings, progress_);
   }
 
   void split(const std::vector<SplitPlace>& places) {
@@ -362,9 +405,12 @@ class Converter {
     if (!followed.ok()) return false;
     ControllerMotion motion = std::move(followed.value());
     Verification machine = verify_machine(motion.joints(), in_.machine);
-    const Checks deviation = verify_deviation(
-        motion.read, in_.machine, {reference_, out_.line_map, program_, chain_, turn_, part_box()},
-        progress_);
+    DeviationInput with{reference_, out_.line_map, program_, chain_, turn_, part_box()};
+    if (in_.machine.dialect.path_mode != "exact")
+      with.rounding = blend_allowances(motion.read, chain_, tool_length);
+    if (in_.machine.recipe.task == "pose")
+      with.whole_rotation = input_tool_rotation(chain_.tool_axis, in_.machine.recipe.spin);
+    const Checks deviation = verify_deviation(motion.read, in_.machine, with, progress_);
     out_.blocks = motion.read.moves.size();
     if (turn_ != ToolTurn::none)
       out_.assumes.push_back(

@@ -9,6 +9,7 @@
 #include "postproc/pipeline/cuts.h"
 #include "postproc/pipeline/interpret.h"
 #include "postproc/pipeline/line_map.h"
+#include "postproc/pipeline/smoothed_path.h"
 #include "postproc/pipeline/verify.h"
 
 namespace smoothpost {
@@ -64,6 +65,8 @@ struct Conversion {
   double scheduled_time = 0.0;
   double length = 0.0;  ///< mm, of the tip
   std::vector<CutSummary> cuts;
+  std::vector<SmoothedCorner> corners;
+  std::uint32_t merged_points = 0;
   std::size_t links = 0;
   std::size_t blocks = 0;
   std::vector<StageTime> stages;

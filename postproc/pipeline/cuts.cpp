@@ -46,7 +46,8 @@ class Partition {
     const PathPoint& to = path_.points[k];
     return !to.replanned && !to.is_arc && from.tool_length == to.tool_length &&
            (from.location.tip - to.location.tip).norm() < kSamePlace &&
-           (from.location.axis - to.location.axis).norm() < kSameAxis && from.words == to.words;
+           (from.location.axis - to.location.axis).norm() < kSameAxis &&
+           from.rotation.angularDistance(to.rotation) < kSameAxis && from.words == to.words;
   }
 
   // Stretches that do not work but belong to the cut around them: micro-joints, and standing still.

@@ -56,9 +56,25 @@ Place ahead(const MachineProgram& program, const MachineDefinition& machine, std
   return place;
 }
 
+PathPlace place_on(const ReferencePath* reference, const MachineMove& move, double share) {
+  if (reference == nullptr || move.from_segment == move.segment)
+    return {move.segment, move.from_share + share * (move.to_share - move.from_share)};
+  return place_between(*reference, {move.from_segment, move.from_share},
+                       {move.segment, move.to_share}, share);
+}
+void begin(MachineMove& move, const PathPlace& place) {
+  move.from_segment = place.segment;
+  move.from_share = place.s;
+}
+void end(MachineMove& move, const PathPlace& place) {
+  move.segment = place.segment;
+  move.to_share = place.s;
+}
+
 }  // namespace
 
-void compensate_latency(MachineProgram& program, const MachineDefinition& machine, ToolTurn turn) {
+void compensate_latency(MachineProgram& program, const MachineDefinition& machine, ToolTurn turn,
+                        const ReferencePath* reference) {
   std::vector<Place> places;
   bool any = false;
   for (std::size_t a = 0; a < program.actions.size(); ++a) {
@@ -88,8 +104,8 @@ void compensate_latency(MachineProgram& program, const MachineDefinition& machin
         if (whole.interpolation == MoveInterpolation::tool)
           part.tool = tool_motion(program.moves[i - 1].tool, whole.tool, place.share, turn,
                                   machine.tool.axis);
-        part.from_share = whole.from_share + done * (whole.to_share - whole.from_share);
-        part.to_share = whole.from_share + place.share * (whole.to_share - whole.from_share);
+        begin(part, place_on(reference, whole, done));
+        end(part, place_on(reference, whole, place.share));
         part.duration = (place.share - done) * whole.duration;
         moves.push_back(std::move(part));
         done = place.share;
@@ -101,7 +117,7 @@ void compensate_latency(MachineProgram& program, const MachineDefinition& machin
     moves.push_back(program.moves[i]);
     if (done > 0.0) {
       MachineMove& rest = moves.back();
-      rest.from_share += done * (rest.to_share - rest.from_share);
+      begin(rest, place_on(reference, program.moves[i], done));
       rest.duration *= 1.0 - done;
     }
   }

@@ -2,6 +2,7 @@
 
 #include "machines/definition/machine.h"
 #include "machines/dialects/dialect.h"
+#include "postproc/pipeline/reference_path.h"
 
 namespace smoothpost {
 
@@ -14,6 +15,8 @@ namespace smoothpost {
 /// latency ahead. Cost: linear in moves and actions.
 /// `turn`: how the controller turns the tool on tool moves, which carry their start in the tool
 /// pose of the move before.
-void compensate_latency(MachineProgram& program, const MachineDefinition& machine, ToolTurn turn);
+/// `reference`: needed where a move takes the place of several segments.
+void compensate_latency(MachineProgram& program, const MachineDefinition& machine, ToolTurn turn,
+                        const ReferencePath* reference = nullptr);
 
 }  // namespace smoothpost

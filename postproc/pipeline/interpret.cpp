@@ -529,7 +529,9 @@ Result<InterpretedInput> interpret_csv(std::string text, const InputSettings& se
   if (!read.ok()) return Result<InterpretedInput>::failure(read.diagnostics());
   InterpretedInput input;
   input.path = std::move(read.value());
-  input.reference = "tip on straight lines, tool axis on great circles";
+  input.reference = input.path.full_pose
+                        ? "tip on straight lines, rotation about one fixed axis a row (slerp)"
+                        : "tip on straight lines, tool axis on great circles";
   input.lines = lines;
   return Result<InterpretedInput>(std::move(input), read.diagnostics());
 }

@@ -25,9 +25,9 @@ double nearest_turn(double angle, double reference) {
 
 class Planner {
  public:
-  Planner(const ReferencePath& reference, const RotaryPair& pair, const JointPlanSettings& settings,
+  Planner(const SmoothedPath& path, const RotaryPair& pair, const JointPlanSettings& settings,
           const Progress& progress)
-      : reference_(reference), pair_(pair), settings_(settings), progress_(progress) {
+      : path_(path), pair_(pair), settings_(settings), progress_(progress) {
     // The pole is the first rotary's own direction, seen from the part; it does not move with the
     // path.
     pole_ = jacobian(pair.chain(), settings.held).col(pair.first_rotary()).head<3>().normalized();
@@ -41,7 +41,7 @@ class Planner {
       return Result<JointPlan>(splits(tracking));
     if (tracking.status != BranchTracking::Status::ok)
       return Result<JointPlan>::failure(tracking_failure(
-          tracking, reference_.path().points[tracked_[tracking.point].segment].line, settings_));
+          tracking, path_.point(tracked_[tracking.point].segment).line, settings_));
     for (std::size_t i = 0; i < tracked_.size(); ++i) {
       JointSample to = tracked_[i];
       to.q = tracking.q[i];
@@ -49,8 +49,7 @@ class Planner {
       if (i > 0 && !replanned(to.segment)) {
         const JointSample from = at_start_of(samples_.back(), to.segment);
         if (!refine(from, to, 0))
-          return Result<JointPlan>::failure(
-              too_steep(reference_.path().points[to.segment].line, settings_));
+          return Result<JointPlan>::failure(too_steep(path_.point(to.segment).line, settings_));
       }
       samples_.push_back(std::move(to));
       if (i % 4096 == 0 &&
@@ -58,13 +57,22 @@ class Planner {
         return Result<JointPlan>::failure(plan_cancelled());
     }
     JointPlan plan;
+    if (settings_.tool_moves)
+      drop_guides(samples_, [this](const JointSample& a, const JointSample& b) {
+        return tool_takes_joints(a, b) && follows_by_tool(a, b);
+      });
+    for (JointSample& sample : samples_) {
+      const PathPlace on_input = path_.place(sample.segment, sample.s);
+      sample.segment = on_input.segment;
+      sample.s = on_input.s;
+    }
     plan.samples = std::move(samples_);
     return Result<JointPlan>(std::move(plan));
   }
 
  private:
   bool replanned(std::size_t segment) const {
-    return segment > 0 && reference_.path().points[segment].replanned;
+    return segment > 0 && path_.point(segment).replanned;
   }
 
   static JointSample at_start_of(JointSample sample, std::uint32_t segment) {
@@ -77,9 +85,8 @@ class Planner {
 
   // The pose asked of the chain: of the holder, with an axis inside the cap put onto the pole.
   CutterLocation target(std::size_t segment, double s, double cap_share = 1.0) const {
-    const auto& points = reference_.path().points;
-    CutterLocation location = segment == 0 ? points[0].location : reference_.at(segment, s);
-    const double tool_length = points[segment].tool_length;
+    CutterLocation location = path_.at(segment, s);
+    const double tool_length = path_.point(segment).tool_length;
     if (in_cap(location.axis, cap_share))
       location.axis = location.axis.dot(pole_) > 0.0 ? pole_ : Vec3(-pole_);
     return holder_location(location, tool_length);
@@ -90,13 +97,14 @@ class Planner {
   }
 
   void collect_tracked() {
-    if (reference_.segments() == 0 || !replanned(1)) add_tracked(0, 1.0, target(0, 1.0));
-    for (std::size_t k = 1; k <= reference_.segments(); ++k) {
+    if (path_.legs() == 0 || !replanned(1)) add_tracked(0, 1.0, target(0, 1.0));
+    for (std::size_t k = 1; k <= path_.legs(); ++k) {
       if (!replanned(k)) {
-        const CutterLocation from = target(k, 0.0);
-        const CutterLocation to = target(k, 1.0);
-        subdivide(k, {0.0, from}, {1.0, to}, 0);
-      } else if (k < reference_.segments() && !replanned(k + 1)) {
+        const std::vector<double> breaks = path_.breaks(k);
+        for (std::size_t b = 1; b < breaks.size(); ++b)
+          subdivide(k, {breaks[b - 1], target(k, breaks[b - 1])}, {breaks[b], target(k, breaks[b])},
+                    0);
+      } else if (k < path_.legs() && !replanned(k + 1)) {
         add_tracked(k, 1.0, target(k, 1.0));
       }
     }
@@ -111,10 +119,11 @@ class Planner {
     // A full turn of a rotary has equal ends: the input's own turn decides, not only what the ends
     // show.
     const double mid_s = 0.5 * (from.s + to.s);
-    const bool may_turn = total_turn(segment) * (to.s - from.s) > kRotaryStep;
+    const bool may_turn = total_turn(segment, from.s, to.s) * (to.s - from.s) > kRotaryStep;
     if (depth < kMaxSplits && (may_turn || too_far(from.location, to.location))) {
       const Node mid{mid_s, target(segment, mid_s)};
       subdivide(segment, from, mid, depth + 1);
+      tracked_.back().guide = true;
       subdivide(segment, mid, to, depth + 1);
       return;
     }
@@ -123,8 +132,8 @@ class Planner {
 
   // A bound of the angle that the tool axis sweeps on a segment: the bound of |axis''| is its
   // square.
-  double total_turn(std::size_t segment) const {
-    return std::sqrt(reference_.second_derivative_bound(segment).axis);
+  double total_turn(std::size_t segment, double from, double to) const {
+    return std::sqrt(path_.second_derivative_bound(segment, from, to).axis);
   }
 
   bool too_far(const CutterLocation& a, const CutterLocation& b) const {
@@ -138,15 +147,17 @@ class Planner {
   }
 
   void add_tracked(std::size_t segment, double s, CutterLocation location) {
-    tracked_.push_back({static_cast<std::uint32_t>(segment), s, 0, {}});
+    JointSample sample;
+    sample.segment = static_cast<std::uint32_t>(segment);
+    sample.s = s;
+    tracked_.push_back(std::move(sample));
     locations_.push_back(std::move(location));
   }
 
   BranchTracking track() const {
     std::vector<TrackingPoint> points(tracked_.size());
-    const auto& path = reference_.path().points;
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const PathPoint& p = path[tracked_[i].segment];
+      const PathPoint& p = path_.point(tracked_[i].segment);
       points[i].location = locations_[i];
       points[i].line = p.line;
       // With the axis on the pole the first rotary is free; where it has to turn, it turns on a
@@ -182,8 +193,8 @@ class Planner {
     const int first = pair_.first_rotary();
     const double step = std::abs(to.q[first] - from.q[first]);
     if (step > 1e-9 && std::abs(mid.q[first] - mean[first]) > 0.35 * step &&
-        in_cap(reference_.at(to.segment, from.s).axis, kTurnCap) &&
-        in_cap(reference_.at(to.segment, to.s).axis, kTurnCap)) {
+        in_cap(path_.at(to.segment, from.s).axis, kTurnCap) &&
+        in_cap(path_.at(to.segment, to.s).axis, kTurnCap)) {
       if (!place(mid, mean, kTurnCap)) return false;
     }
     if (!refine(from, mid, depth + 1)) return false;
@@ -212,9 +223,9 @@ class Planner {
   }
 
   bool follows(const JointSample& from, const JointSample& to) const {
-    const double tool_length = reference_.path().points[to.segment].tool_length;
+    const double tool_length = path_.point(to.segment).tool_length;
     for (const double t : {0.25, 0.5, 0.75}) {
-      const CutterLocation wanted = reference_.at(to.segment, from.s + t * (to.s - from.s));
+      const CutterLocation wanted = path_.at(to.segment, from.s + t * (to.s - from.s));
       const JointVector q = from.q + t * (to.q - from.q);
       const CutterLocation holder = forward_location(pair_.chain(), q);
       const Vec3 tip = holder.tip - tool_length * holder.axis;
@@ -233,7 +244,7 @@ class Planner {
     for (const int j : {pair_.first_rotary(), pair_.second_rotary()})
       whole = std::max(whole, std::abs(to.q[j] - from.q[j]));
     const double largest = std::max(kUneven * whole / kSteps, kAtOnce);
-    const double tool_length = reference_.path().points[to.segment].tool_length;
+    const double tool_length = path_.point(to.segment).tool_length;
     const CutterLocation a = tip_at(from.q, tool_length);
     const CutterLocation b = tip_at(to.q, tool_length);
     JointVector q = from.q;
@@ -263,11 +274,11 @@ class Planner {
 
   // The controller keeps the tip straight and takes the axis along the great circle.
   bool follows_by_tool(const JointSample& from, const JointSample& to) const {
-    const double tool_length = reference_.path().points[to.segment].tool_length;
+    const double tool_length = path_.point(to.segment).tool_length;
     const CutterLocation a = tip_at(from.q, tool_length);
     const CutterLocation b = tip_at(to.q, tool_length);
     for (const double t : {0.25, 0.5, 0.75}) {
-      const CutterLocation wanted = reference_.at(to.segment, from.s + t * (to.s - from.s));
+      const CutterLocation wanted = path_.at(to.segment, from.s + t * (to.s - from.s));
       const Vec3 tip = a.tip + t * (b.tip - a.tip);
       if ((tip - wanted.tip).norm() > 0.8 * settings_.tip_tolerance) return false;
       if ((great_circle(a.axis, b.axis, t) - wanted.axis).norm() > 0.8 * settings_.axis_tolerance)
@@ -286,12 +297,12 @@ class Planner {
     JointPlan plan;
     for (const auto& rewind : tracking.rewinds) {
       const JointSample& before = tracked_[rewind.point - 1];
-      plan.splits.push_back({before.segment, before.s});
+      plan.splits.push_back(path_.place(before.segment, before.s));
     }
     return plan;
   }
 
-  const ReferencePath& reference_;
+  const SmoothedPath& path_;
   const RotaryPair& pair_;
   const JointPlanSettings& settings_;
   const Progress& progress_;
@@ -308,9 +319,9 @@ CutterLocation holder_location(const CutterLocation& tip, double tool_length) {
   return {tip.tip + tool_length * tip.axis, tip.axis};
 }
 
-Result<JointPlan> plan_joints(const ReferencePath& reference, const RotaryPair& pair,
+Result<JointPlan> plan_joints(const SmoothedPath& path, const RotaryPair& pair,
                               const JointPlanSettings& settings, const Progress& progress) {
-  return Planner(reference, pair, settings, progress).run();
+  return Planner(path, pair, settings, progress).run();
 }
 
 }  // namespace smoothpost

@@ -8,7 +8,7 @@
 #include "kernels/core/progress.h"
 #include "kernels/core/result.h"
 #include "kernels/kinematics/rotary_pair.h"
-#include "postproc/pipeline/reference_path.h"
+#include "postproc/pipeline/smoothed_path.h"
 
 namespace smoothpost {
 
@@ -20,6 +20,7 @@ struct JointPlanSettings {
   std::string file_name;        ///< for messages
   std::vector<std::string> axis_names;  ///< for messages, in joint order
   bool tool_moves = false;              ///< the controller interpolates tip and axis, not joints
+  bool whole_rotation = false;          ///< arms: the input's rotation about the tool counts too
   std::optional<double> spin;           ///< rad, arms: the rotation about the tool axis (plan_arm)
   bool may_split = false;               ///< a cut may be split where a rotary has to be unwound
 };
@@ -30,31 +31,50 @@ struct JointSample {
   double s = 1.0;
   int branch = 0;
   JointVector q;
+  bool guide = false;      ///< inside a piece of one formula: there for the choice of the joints
   bool by_joints = false;  ///< with tool moves: the way here is straight in the joints all the same
 };
 
 /// A place inside a cut that has no continuous way on: the cut has to be split there.
-struct SplitPlace {
-  std::uint32_t segment = 0;
-  double s = 1.0;
-};
+using SplitPlace = PathPlace;
+
+/// Drops guides that a tool move from the sample before to the one behind does without:
+/// `follows(before, behind)`, with `before` at share 0 of the leg of `behind` if it ends another.
+template <class Follows>
+void drop_guides(std::vector<JointSample>& samples, const Follows& follows) {
+  std::size_t kept = 0;
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    bool needed = !samples[i].guide || i + 1 == samples.size() || samples[i + 1].by_joints ||
+                  samples[i].by_joints;
+    if (!needed) {
+      JointSample before = samples[kept];
+      if (before.segment != samples[i + 1].segment) {
+        before.segment = samples[i + 1].segment;
+        before.s = 0.0;
+      }
+      needed = !follows(before, samples[i + 1]);
+    }
+    if (needed) samples[++kept] = samples[i];
+  }
+  if (!samples.empty()) samples.resize(kept + 1);
+}
 
 struct JointPlan {
   std::vector<JointSample> samples;
   std::vector<SplitPlace> splits;  ///< not empty: no samples; split there and plan again
 };
 
-/// Joint values along the whole reference path, close enough that straight joint motion from each
+/// Joint values along the whole path, close enough that straight joint motion from each
 /// sample to the next stays inside the tolerances (checked at quarter points; the certificate
-/// bounds it). One global choice of branch and winding; the last sample of every segment is at s
-/// = 1. With settings.tool_moves a step whose joints would jump on the tool's own way (over the
-/// pole, where the first rotary has to turn while the tool axis stands) goes straight in the
-/// joints. Of a run of replanned segments only its end has a sample: where the next run starts.
-/// `pair` is the output machine's chain with tool length 0 and the part placed in it. Failures:
-/// KN101 unreachable, KN102 limits, KN103 rewind needed (input lines named; with settings.may_split
-/// the places are in JointPlan::splits instead), KN104 a motion that cannot be followed inside the
-/// tolerances. Cost: linear in the samples.
-Result<JointPlan> plan_joints(const ReferencePath& reference, const RotaryPair& pair,
+/// bounds it). One global choice of branch and winding; every leg ends with a
+/// sample, and samples are places of the input. With settings.tool_moves a step whose joints would
+/// jump on the tool's own way (over the pole, where the first rotary has to turn while the tool
+/// axis stands) goes straight in the joints. Of a run of replanned segments only its end has a
+/// sample: where the next run starts. `pair` is the output machine's chain with tool length 0 and
+/// the part placed in it. Failures: KN101 unreachable, KN102 limits, KN103 rewind needed (input
+/// lines named; with settings.may_split the places are in JointPlan::splits instead), KN104 a
+/// motion that cannot be followed inside the tolerances. Cost: linear in the samples.
+Result<JointPlan> plan_joints(const SmoothedPath& path, const RotaryPair& pair,
                               const JointPlanSettings& settings, const Progress& progress);
 
 /// The holder's reference point for a tool of `tool_length`: what a chain of tool length 0 is asked

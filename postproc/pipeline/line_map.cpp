@@ -11,7 +11,7 @@ LineMap line_map_of(const MachineProgram& program, const EmittedProgram& emitted
   for (std::size_t i = 0; i < program.moves.size(); ++i) {
     const MachineMove& m = program.moves[i];
     map.push_back(
-        {emitted.move_lines[i], m.input_line, m.role, m.segment, m.from_share, m.to_share});
+        {emitted.move_lines[i], m.input_line, m.role, m.segment, m.from_segment, m.from_share, m.to_share});
   }
   return map;
 }

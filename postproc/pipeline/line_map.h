@@ -13,7 +13,8 @@ struct LineMapEntry {
   std::uint32_t output_line = 0;
   std::uint32_t input_line = 0;  ///< 0 for a link of ours
   MoveRole role = MoveRole::link;
-  std::uint32_t segment = 0;
+  std::uint32_t segment = 0;       ///< where the block ends
+  std::uint32_t from_segment = 0;  ///< where it starts; below segment when points were merged
   double from_share = 0.0;
   double to_share = 1.0;
 };

@@ -32,6 +32,7 @@ class Builder {
  public:
   Builder(const ProgramInput& input, const std::vector<JointSample>& samples)
       : in_(input),
+        path_(input.reference.path()),
         machine_(input.machine),
         samples_(samples),
         links_(input.machine, input.chain, retract_beyond(input.machine, samples), input.part) {
@@ -46,14 +47,14 @@ class Builder {
     std::size_t end = 0;  // sample behind the last run
     while (end < samples_.size()) {
       const std::size_t begin = end++;
-      while (end < samples_.size() && !in_.path.points[samples_[end].segment].replanned) ++end;
+      while (end < samples_.size() && !path_.points[samples_[end].segment].replanned) ++end;
       run_of(begin, end);
     }
     const Link home = links_.last(link_end(samples_.size() - 1));
-    if (home.cramped) cramped_.push_back(in_.path.points.back().line);
+    if (home.cramped) cramped_.push_back(path_.points.back().line);
     append(home.away, link_end(samples_.size() - 1).tool_length);
-    emit_until(in_.path.points.size());
-    compensate_latency(out_, machine_, in_.turn);
+    emit_until(path_.points.size());
+    compensate_latency(out_, machine_, in_.turn, &in_.reference);
     return {std::move(out_), std::move(cramped_)};
   }
 
@@ -68,7 +69,7 @@ class Builder {
       link = links_.between(link_end(begin - 1), link_end(begin), changes_tool(start_point));
       append(link.away, link_end(begin - 1).tool_length);
     }
-    if (link.cramped) cramped_.push_back(in_.path.points[start_point].line);
+    if (link.cramped) cramped_.push_back(path_.points[start_point].line);
     const double tool_length = link_end(begin).tool_length;
     if (end > begin + 1) label(samples_[begin + 1].segment);
     append(link.approach, tool_length, 0, link.retracted);
@@ -78,14 +79,14 @@ class Builder {
     append(link.approach, tool_length, link.retracted);
     emit_at(start_point, true);
     for (std::size_t i = begin + 1; i < end; ++i) {
-      const PathPoint& point = in_.path.points[samples_[i].segment];
+      const PathPoint& point = path_.points[samples_[i].segment];
       follow(i, point);
       if (samples_[i].s == 1.0) emit_at(samples_[i].segment, i + 1 < end);
     }
   }
 
   LinkEnd link_end(std::size_t sample) const {
-    return {samples_[sample].q, in_.path.points[samples_[sample].segment].tool_length};
+    return {samples_[sample].q, path_.points[samples_[sample].segment].tool_length};
   }
 
   void append(const std::vector<MachineMove>& moves, double tool_length, std::size_t from = 0,
@@ -106,7 +107,7 @@ class Builder {
     MachineAction action;
     action.kind = MachineAction::Kind::cut_label;
     action.before = out_.moves.size();
-    action.input_line = in_.path.points[segment].line;
+    action.input_line = path_.points[segment].line;
     if (cut != in_.cuts.end()) {
       action.text = "CUT " + std::to_string(cut->number) +
                     (cut->after_rewind ? " goes on after a rewind" : "");
@@ -118,7 +119,7 @@ class Builder {
   }
 
   std::string tool_text(std::uint32_t segment) const {
-    const std::int32_t tool = in_.path.points[segment].tool;
+    const std::int32_t tool = path_.points[segment].tool;
     return tool > 0 ? " with tool " + std::to_string(tool) : "";
   }
 
@@ -127,9 +128,9 @@ class Builder {
   }
 
   bool changes_tool(std::size_t before_point) const {
-    for (std::size_t i = next_event_; i < in_.path.events.size(); ++i) {
-      if (in_.path.events[i].point > before_point) break;
-      if (is_tool_change(in_.path.events[i])) return true;
+    for (std::size_t i = next_event_; i < path_.events.size(); ++i) {
+      if (path_.events[i].point > before_point) break;
+      if (is_tool_change(path_.events[i])) return true;
     }
     return false;
   }
@@ -137,7 +138,7 @@ class Builder {
   // States that are on and that no event of this link sets anew, in the order they came on.
   std::vector<PathEvent> states_to_restate(std::size_t start_point) const {
     std::vector<std::string> set_here;
-    const auto& events = in_.path.events;
+    const auto& events = path_.events;
     for (std::size_t i = next_event_; i < events.size() && events[i].point <= start_point; ++i)
       if (events[i].kind == PathEvent::Kind::process)
         set_here.push_back(state_group(events[i].event.name));
@@ -153,7 +154,7 @@ class Builder {
 
   // Events before `point`, and those at it that stand before the run's start in the input.
   void emit_until(std::size_t point) {
-    const auto& events = in_.path.events;
+    const auto& events = path_.events;
     while (next_event_ < events.size() &&
            (events[next_event_].point < point ||
             (events[next_event_].point == point && events[next_event_].before_start)))
@@ -162,7 +163,7 @@ class Builder {
 
   // Events at `point`; at the end of a run those from a tool change on wait for the link.
   void emit_at(std::size_t point, bool inside) {
-    const auto& events = in_.path.events;
+    const auto& events = path_.events;
     while (next_event_ < events.size() && events[next_event_].point <= point) {
       if (!inside && is_tool_change(events[next_event_])) return;
       emit(events[next_event_++]);
@@ -200,13 +201,30 @@ class Builder {
     move.role = MoveRole::path;
     move.input_line = point.line;
     move.segment = to.segment;
-    move.from_share = samples_[i - 1].segment == to.segment ? samples_[i - 1].s : 0.0;
+    const PathPlace from = start_place(samples_[i - 1]);
+    move.from_segment = from.segment;
+    move.from_share = from.s;
     move.to_share = to.s;
     if (!move.rapid)
       move.duration = block_time(by_tool ? tool_travel(samples_[i - 1].q, move, point.tool_length)
                                          : JointVector((move.to - samples_[i - 1].q).cwiseAbs()),
                                  move, point);
     push(std::move(move), point.tool_length);
+  }
+
+  // The end of a segment is the start of the next.
+  static PathPlace start_place(const JointSample& sample) {
+    if (sample.s == 1.0) return {sample.segment + 1, 0.0};
+    return {sample.segment, sample.s};
+  }
+
+  // Of the input's way that a move takes the place of, s.
+  double programmed_time(const MachineMove& move) const {
+    double time = 0.0;
+    for (std::uint32_t k = move.from_segment; k <= move.segment; ++k)
+      time += path_.points[k].duration * ((k == move.segment ? move.to_share : 1.0) -
+                                          (k == move.from_segment ? move.from_share : 0.0));
+    return time;
   }
 
   // The fastest that each joint goes on a tool move, as the way that it would go at that rate.
@@ -232,7 +250,7 @@ class Builder {
   // `travel`: of each joint, absolute.
   double block_time(const JointVector& travel, const MachineMove& move,
                     const PathPoint& point) const {
-    double time = point.duration * (move.to_share - move.from_share);
+    double time = programmed_time(move);
     for (int j = 0; j < machine_.size(); ++j) {
       const auto& axis = machine_.axes[static_cast<std::size_t>(j)];
       const double step = travel[j];
@@ -248,6 +266,7 @@ class Builder {
   }
 
   const ProgramInput& in_;
+  const ToolPath& path_;
   const MachineDefinition& machine_;
   const std::vector<JointSample>& samples_;
   LinkPlanner links_;

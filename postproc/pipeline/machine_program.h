@@ -15,7 +15,7 @@ namespace smoothpost {
 inline constexpr double kAssumedShare = 0.9;
 
 struct ProgramInput {
-  const ToolPath& path;  ///< with its links marked (find_cuts)
+  const ReferencePath& reference;  ///< of the path with its links marked (find_cuts)
   const std::vector<Cut>& cuts;
   const MachineDefinition& machine;
   const ScrewChain& chain;  ///< of the machine, tool length 0, part placed

@@ -10,7 +10,7 @@ namespace smoothpost {
 /// One run of the tool: every option under the name it has on the command line, in a job file and
 /// in the C structure. Text is as the user wrote it; `settings.h` reads it.
 struct Options {
-  std::string command;                    ///< convert | check | machines | formats | golden
+  std::string command;                    ///< convert | check | place | machines | formats | golden
   std::vector<std::string> arguments;     ///< sub-command words: list, show NAME, run DIR ...
   std::string input;                      ///< path, or "-"
   std::optional<std::string> input_data;  ///< bytes given by the host instead of a file
@@ -26,7 +26,7 @@ struct Options {
   std::string integer_unit;  ///< fanuc, haas: 1 | 0.001, mm or deg of a number without point
   std::string input_machine;
   std::string process;
-  std::vector<std::string> work_offset;        ///< G54=x,y,z[,a,b,c]: on the output machine
+  std::vector<std::string> work_offset;        ///< G54=x,y,z[,a,b,c] | auto: on the output machine
   std::vector<std::string> input_work_offset;  ///< G54=x,y,z[,a,b,c]: on the input machine
   std::vector<std::string> tool;               ///< N=length
   std::string tip_tolerance;
@@ -39,6 +39,8 @@ struct Options {
   std::string schedule;
   std::string links;
   std::string cuts;
+  std::string box;   ///< place: x0,y0,z0,x1,y1,z1, mm: where the program's zero may lie
+  std::string turn;  ///< place: deg, largest turn about the vertical
   std::string against;
   std::string json;
   std::string report;

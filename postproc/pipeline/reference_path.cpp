@@ -15,6 +15,11 @@ double rotary_turn(const AxisWords& from, const AxisWords& to) {
   return turn;
 }
 
+bool by_words(PathInterpolation interpolation) {
+  return interpolation == PathInterpolation::rotary_linear ||
+         interpolation == PathInterpolation::joint_linear;
+}
+
 Vec3 xyz(const AxisWords& words) { return Vec3(words[0], words[1], words[2]); }
 
 }  // namespace
@@ -38,8 +43,7 @@ JointVector ReferencePath::joints_of(const AxisWords& words, double compensation
 
 CutterLocation ReferencePath::location_of_words(const AxisWords& words,
                                                 const PathPoint& like) const {
-  require(like.interpolation != PathInterpolation::great_circle,
-          "words need an interpolation by words");
+  require(by_words(like.interpolation), "words need an interpolation by words");
   CutterLocation location;
   if (!chain_) {  // a program without rotary words and without an input machine: the axis is Z
     location.axis = part_from_world_.linear() * Vec3::UnitZ();
@@ -83,8 +87,10 @@ CutterLocation ReferencePath::at(std::size_t segment, double s) const {
   require(segment >= 1 && segment <= segments(), "segment of the path");
   const PathPoint& from = path_.points[segment - 1];
   const PathPoint& to = path_.points[segment];
-  if (to.interpolation == PathInterpolation::great_circle) {
-    const Vec3 axis = great_circle(from.location.axis, to.location.axis, s);
+  if (!by_words(to.interpolation)) {
+    const Vec3 axis = to.interpolation == PathInterpolation::slerp
+                          ? rotation_at(segment, s) * Vec3::UnitZ()
+                          : great_circle(from.location.axis, to.location.axis, s);
     if (to.is_arc)
       return {part_from_world_ * xyz(words_at(segment, s)) - to.tip_offset * axis, axis};
     return {from.location.tip + s * (to.location.tip - from.location.tip), axis};
@@ -92,12 +98,19 @@ CutterLocation ReferencePath::at(std::size_t segment, double s) const {
   return location_of_words(words_at(segment, s), to);
 }
 
+Eigen::Quaterniond ReferencePath::rotation_at(std::size_t segment, double s) const {
+  require(path_.full_pose, "the path has whole rotations");
+  return path_.points[segment - 1].rotation.slerp(s, path_.points[segment].rotation);
+}
+
 SecondDerivativeBound ReferencePath::second_derivative_bound(std::size_t segment) const {
   const PathPoint& from = path_.points[segment - 1];
   const PathPoint& to = path_.points[segment];
   SecondDerivativeBound bound;
-  if (to.interpolation == PathInterpolation::great_circle) {
-    const double angle = angle_between(from.location.axis, to.location.axis);
+  if (!by_words(to.interpolation)) {
+    const double angle = to.interpolation == PathInterpolation::slerp
+                             ? from.rotation.angularDistance(to.rotation)
+                             : angle_between(from.location.axis, to.location.axis);
     bound.axis = angle * angle;
     if (!to.is_arc) return bound;
   }
@@ -115,7 +128,7 @@ SecondDerivativeBound ReferencePath::second_derivative_bound(std::size_t segment
     arc_speed = std::max(radius, end_radius) * std::abs(arc.sweep) + std::abs(end_radius - radius) +
                 std::abs(arc.normal.dot(xyz(to.words) - xyz(from.words)));
   }
-  if (to.interpolation == PathInterpolation::great_circle) {
+  if (!by_words(to.interpolation)) {
     bound.tip = arc_second + std::abs(to.tip_offset) * bound.axis;
     return bound;
   }
@@ -157,6 +170,32 @@ double ReferencePath::length(std::size_t segment) const {
     last = next;
   }
   return length;
+}
+
+PathPlace place_between(const ReferencePath& reference, const PathPlace& from, const PathPlace& to,
+                        double t) {
+  const bool next = from.s == 1.0 && from.segment + 1 == to.segment;
+  if (from.segment == to.segment || next) {
+    const double start = next ? 0.0 : from.s;
+    return {to.segment, t >= 1.0 ? to.s : start + t * (to.s - start)};
+  }
+  double length = 0.0;
+  const auto part = [&](std::uint32_t k) {
+    const double first = k == from.segment ? from.s : 0.0;
+    const double last = k == to.segment ? to.s : 1.0;
+    return reference.length(k) * (last - first);
+  };
+  for (std::uint32_t k = from.segment; k <= to.segment; ++k) length += part(k);
+  double left = t * length;
+  for (std::uint32_t k = from.segment; k <= to.segment; ++k) {
+    const double here = part(k);
+    const double first = k == from.segment ? from.s : 0.0;
+    const double last = k == to.segment ? to.s : 1.0;
+    if ((left < here || (t < 1.0 && k == to.segment)) && here > 0.0)
+      return {k, std::min(last, first + left / here * (last - first))};
+    left -= here;
+  }
+  return to;
 }
 
 }  // namespace smoothpost

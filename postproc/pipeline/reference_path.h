@@ -8,6 +8,12 @@
 
 namespace smoothpost {
 
+/// A place on the input: share s of a segment.
+struct PathPlace {
+  std::uint32_t segment = 0;
+  double s = 1.0;
+};
+
 /// The input's motion as its own controller would make it: what an output is compared with.
 /// Immutable; the tool path outlives it.
 class ReferencePath {
@@ -26,14 +32,20 @@ class ReferencePath {
   /// Tip (mm) and tool axis in W at share s ∈ [0, 1] of `segment` (1 ≤ segment ≤ segments()).
   CutterLocation at(std::size_t segment, double s) const;
 
+  /// The whole rotation of the tool frame there, its Z along the axis.   @pre path().full_pose
+  Eigen::Quaterniond rotation_at(std::size_t segment, double s) const;
+
   /// Bounds of |d²/ds²| of tip and axis on a segment; hold everywhere on it.
   SecondDerivativeBound second_derivative_bound(std::size_t segment) const;
 
   /// Path length of the tip over a segment, mm; 0 when only the axis turns.
   double length(std::size_t segment) const;
 
+  /// A direction of the words' frame, in W.
+  Vec3 part_direction(const Vec3& direction) const { return part_from_world_.linear() * direction; }
+
   /// The pose of `words` read with the interpolation, compensation and tip offset of `like`.
-  /// @pre like.interpolation is not great_circle
+  /// @pre like.interpolation goes by words
   CutterLocation location_of_words(const AxisWords& words, const PathPoint& like) const;
 
   /// The input's axis words on the way.   @pre as for at()
@@ -47,5 +59,11 @@ class ReferencePath {
   std::optional<ScrewChain> chain_;  ///< of the input machine, tool length 0
   Pose part_from_world_;
 };
+
+/// The place at share t ∈ [0, 1] of the way from one place of a path to a later one, by tip length;
+/// inside one segment by its own share. What pairs a block that takes the place of several segments
+/// with them.   Cost: linear in the segments between.
+PathPlace place_between(const ReferencePath& reference, const PathPlace& from, const PathPlace& to,
+                        double t);
 
 }  // namespace smoothpost

@@ -6,6 +6,7 @@
 
 #include "machines/dialects/krl.h"
 #include "machines/dialects/linuxcnc.h"
+#include "machines/dialects/rapid.h"
 #include "machines/dialects/siemens_840d.h"
 
 namespace smoothpost {
@@ -23,7 +24,7 @@ constexpr std::array<InputFormat, 2> kFormats = {{
 std::span<const InputFormat> input_formats() { return kFormats; }
 
 std::span<const Dialect> dialects() {
-  static const std::array<Dialect, 3> rows = {krl::kDialect, linuxcnc::kDialect,
+  static const std::array<Dialect, 4> rows = {krl::kDialect, linuxcnc::kDialect, rapid::kDialect,
                                               siemens_840d::kDialect};
   return rows;
 }

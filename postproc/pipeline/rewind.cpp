@@ -92,6 +92,7 @@ class Splitter {
     PathPoint p = path_.points[place.segment];
     if (place.s > kWhole) return p;
     p.location = reference_.at(place.segment, place.s);
+    if (path_.full_pose) p.rotation = reference_.rotation_at(place.segment, place.s);
     p.words = reference_.words_at(place.segment, place.s);
     return p;
   }

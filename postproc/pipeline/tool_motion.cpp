@@ -36,6 +36,12 @@ SecondDerivativeBound tool_motion_bound(const Pose& from, const Pose& to, ToolTu
   return bound;
 }
 
+Mat3 input_tool_rotation(const Vec3& tool_axis, std::optional<double> spin) {
+  const Mat3 to_axis =
+      Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), tool_axis).toRotationMatrix();
+  return to_axis * rotation_about(Vec3::UnitZ(), -spin.value_or(0.0));
+}
+
 Pose tip_pose(const ScrewChain& chain, const JointVector& q, double tool_length) {
   Pose pose = forward(chain, q);
   pose.translation() -= tool_length * (pose.linear() * chain.tool_axis);

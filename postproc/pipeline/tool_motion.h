@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "kernels/core/tool_path.h"
 #include "kernels/kinematics/screw_chain.h"
 #include "machines/dialects/dialect.h"
@@ -21,6 +23,11 @@ double turn_allowance(const Pose& from, const Pose& to, ToolTurn turn);
 /// Bound of |d²/dt²| of tip and axis on such a move: 0 and the square of its rotation angle.
 SecondDerivativeBound tool_motion_bound(const Pose& from, const Pose& to, ToolTurn turn,
                                         const Vec3& axis);
+
+/// Rotation from the tool frame of an input with whole rotations (its Z is the tool axis) to the
+/// chain's tool frame (the machine's axes at zero): the least rotation that takes Z to `tool_axis`,
+/// behind a turn of −spin about Z. X_W,chain = R_input · Rz(spin) · Rᵀ(Z → tool_axis).
+Mat3 input_tool_rotation(const Vec3& tool_axis, std::optional<double> spin);
 
 /// The pose of the tip of a tool of `tool_length` when the chain (of tool length 0) is at q.
 Pose tip_pose(const ScrewChain& chain, const JointVector& q, double tool_length);

@@ -238,6 +238,9 @@ class DeviationCheck {
       checks.push_back(tip_.check("tip_deviation", machine_.tolerance.tip, "mm"));
       checks.push_back(
           axis_.check("axis_deviation", degrees_from_radians(machine_.tolerance.axis), "deg"));
+      if (in_.whole_rotation)
+        checks.push_back(rotation_.check("rotation_deviation",
+                                         degrees_from_radians(machine_.tolerance.axis), "deg"));
       add_round_trip(checks);
       if (has_beam(machine_)) {
         compare_beam();
@@ -278,11 +281,16 @@ class DeviationCheck {
       while (share == 1.0 && segment + 1 < e.segment &&
              in_.reference.path().points[segment + 1].replanned)
         ++segment;
-      const bool next = share == 1.0 && e.segment == segment + 1 && e.from_share == 0.0;
-      const bool goes_on = e.segment == segment && e.from_share == share && share < 1.0;
+      const bool next = share == 1.0 && e.from_segment == segment + 1 && e.from_share == 0.0;
+      const bool goes_on = e.from_segment == segment && e.from_share == share;
       if (!next && !goes_on)
         return broken(e.output_line, "a part of the tool path is missing or doubled");
-      if (!(e.to_share > e.from_share)) return broken(e.output_line, "a block goes backwards");
+      if (e.segment < e.from_segment ||
+          (e.segment == e.from_segment && !(e.to_share > e.from_share)))
+        return broken(e.output_line, "a block goes backwards");
+      for (std::uint32_t k = e.from_segment; k <= e.segment; ++k)
+        if (in_.reference.path().points[k].replanned)
+          return broken(e.output_line, "a block passes over a link");
       segment = e.segment;
       share = e.to_share;
     }
@@ -298,39 +306,86 @@ class DeviationCheck {
     broken_line_ = line;
   }
 
+  /// The part of a block, t0 to t1 of its own parameter, that stands for a part of one segment.
+  struct Piece {
+    std::uint32_t segment = 0;
+    double from = 0.0, to = 1.0;
+    double t0 = 0.0, t1 = 1.0;
+  };
+
+  // A block in the place of several segments is paired with them by tip length.
+  std::vector<Piece> pieces_of(const LineMapEntry& e) const {
+    if (e.from_segment == e.segment) return {{e.segment, e.from_share, e.to_share, 0.0, 1.0}};
+    std::vector<Piece> pieces;
+    double length = 0.0;
+    for (std::uint32_t k = e.from_segment; k <= e.segment; ++k) {
+      Piece piece{k, k == e.from_segment ? e.from_share : 0.0, k == e.segment ? e.to_share : 1.0};
+      piece.t0 = length;
+      length += in_.reference.length(k) * (piece.to - piece.from);
+      piece.t1 = length;
+      pieces.push_back(piece);
+    }
+    if (length <= 0.0) return {{e.segment, 0.0, e.to_share, 0.0, 1.0}};  // only the axis turns
+    for (Piece& piece : pieces) {
+      piece.t0 /= length;
+      piece.t1 /= length;
+    }
+    return pieces;
+  }
+
   void compare_block(std::size_t i) {
-    const LineMapEntry& e = in_.map[i];
+    const double tool_length = in_.reference.path().points[in_.map[i].segment].tool_length;
     const ReadBackMove& move = read_.moves[i];
     const bool by_tool = move.interpolation == MoveInterpolation::tool;
-    const JointVector& from = read_.moves[i - 1].to;
-    const double tool_length = in_.reference.path().points[e.segment].tool_length;
-    const double span = e.to_share - e.from_share;
     const Pose start = by_tool ? start_pose(i, tool_length) : Pose::Identity();
-    const auto own = by_tool ? tool_motion_bound(start, move.tool, in_.turn, in_.chain.tool_axis)
-                             : second_derivative_bound(in_.chain, from, move.to);
-    const auto input = in_.reference.second_derivative_bound(e.segment);
-    const double tip_bend =
-        own.tip + (by_tool ? 0.0 : tool_length * own.axis) + span * span * input.tip;
-    const double axis_bend = own.axis + span * span * input.axis;
+    const JointVector& from = read_.moves[i - 1].to;
+    auto own = by_tool ? tool_motion_bound(start, move.tool, in_.turn, in_.chain.tool_axis)
+                       : second_derivative_bound(in_.chain, from, move.to);
+    if (!by_tool) own.tip += tool_length * own.axis;
     const double allowance = by_tool ? turn_allowance(start, move.tool, in_.turn) : 0.0;
-    const int steps = steps_for(tip_bend, axis_bend);
-    const double h2 = 1.0 / (8.0 * steps * steps);
-    for (int k = 0; k <= steps; ++k) {
-      const double t = static_cast<double>(k) / steps;
-      const CutterLocation wanted = in_.reference.at(e.segment, e.from_share + t * span);
-      CutterLocation got;
-      if (by_tool) {
-        const Pose pose = tool_motion(start, move.tool, t, in_.turn, in_.chain.tool_axis);
-        got = {pose.translation(), pose.linear() * in_.chain.tool_axis};
-      } else {
-        got = forward_location(in_.chain, from + t * (move.to - from));
-        got.tip -= tool_length * got.axis;
+    for (const Piece& piece : pieces_of(in_.map[i])) {
+      const double span = piece.to - piece.from;
+      const double part = piece.t1 - piece.t0;
+      const auto input = in_.reference.second_derivative_bound(piece.segment);
+      const double tip_bend = part * part * own.tip + span * span * input.tip;
+      const double axis_bend = part * part * own.axis + span * span * input.axis;
+      const int steps = steps_for(tip_bend, axis_bend);
+      const double h2 = 1.0 / (8.0 * steps * steps);
+      for (int k = 0; k <= steps; ++k) {
+        const double share = static_cast<double>(k) / steps;
+        const double t = piece.t0 + share * part;
+        const Pose pose = by_tool ? tool_motion(start, move.tool, t, in_.turn, in_.chain.tool_axis)
+                                  : tip_pose(in_.chain, from + t * (move.to - from), tool_length);
+        const double s = piece.from + share * span;
+        compare_pose_at(i, pose, {piece.segment, s}, {h2 * tip_bend, h2 * axis_bend + allowance});
       }
-      tip_.see((got.tip - wanted.tip).norm() + h2 * tip_bend, move.line, times_[i], e.input_line);
-      const double chord = (got.axis - wanted.axis).norm() + h2 * axis_bend + allowance;
-      axis_.see(degrees_from_radians(2.0 * std::asin(std::min(1.0, 0.5 * chord))), move.line,
-                times_[i], e.input_line);
     }
+  }
+
+  /// What may be added between samples: of the tip (mm) and of the axis (chord).
+  struct Allowance {
+    double tip = 0.0;
+    double axis = 0.0;
+  };
+
+  void compare_pose_at(std::size_t i, const Pose& pose, const PathPlace& place,
+                       const Allowance& allowance) {
+    const CutterLocation wanted = in_.reference.at(place.segment, place.s);
+    const Vec3 axis = pose.linear() * in_.chain.tool_axis;
+    const std::uint32_t line = in_.reference.path().points[place.segment].line;
+    const double roundings_tip = in_.rounding.empty() ? 0.0 : in_.rounding[i].tip;
+    const double roundings_axis = in_.rounding.empty() ? 0.0 : in_.rounding[i].rotation;
+    tip_.see((pose.translation() - wanted.tip).norm() + allowance.tip + roundings_tip,
+             read_.moves[i].line, times_[i], line);
+    const double chord = (axis - wanted.axis).norm() + allowance.axis + roundings_axis;
+    axis_.see(degrees_from_radians(2.0 * std::asin(std::min(1.0, 0.5 * chord))),
+              read_.moves[i].line, times_[i], line);
+    if (!in_.whole_rotation) return;
+    const Mat3 tool = pose.linear() * *in_.whole_rotation;
+    const double angle =
+        Eigen::Quaterniond(tool).angularDistance(in_.reference.rotation_at(place.segment, place.s));
+    rotation_.see(degrees_from_radians(angle + allowance.axis + roundings_axis),
+                  read_.moves[i].line, times_[i], line);
   }
 
   // Where the tool stands before a tool move.
@@ -347,7 +402,11 @@ class DeviationCheck {
 
   double tip_length(std::size_t i) const {
     const LineMapEntry& e = in_.map[i];
-    return in_.reference.length(e.segment) * (e.to_share - e.from_share);
+    double length = 0.0;
+    for (std::uint32_t k = e.from_segment; k <= e.segment; ++k)
+      length += in_.reference.length(k) *
+                ((k == e.segment ? e.to_share : 1.0) - (k == e.from_segment ? e.from_share : 0.0));
+    return length;
   }
 
   bool is_path(std::size_t i) const {
@@ -529,7 +588,7 @@ class DeviationCheck {
   const MachineDefinition& machine_;
   const DeviationInput& in_;
   std::vector<double> times_;
-  Worst tip_, axis_, event_, pose_tip_, pose_turn_;
+  Worst tip_, axis_, rotation_, event_, pose_tip_, pose_turn_;
   bool has_poses_ = false;
   std::array<Worst, kMaxJoints> joints_;
   double wrong_beam_ = 0.0;

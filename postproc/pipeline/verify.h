@@ -6,6 +6,7 @@
 #include "kernels/core/check.h"
 #include "kernels/core/progress.h"
 #include "machines/dialects/dialect.h"
+#include "postproc/pipeline/controller_blending.h"
 #include "postproc/pipeline/line_map.h"
 #include "postproc/pipeline/links.h"
 #include "postproc/pipeline/reference_path.h"
@@ -44,6 +45,11 @@ struct DeviationInput {
   const ScrewChain& chain;           ///< output machine, tool length 0, part placed
   ToolTurn turn = ToolTurn::none;    ///< of the dialect
   std::optional<PartBox> part = {};  ///< where low links are proven to pass it
+  /// For each move of the text: how far the control itself rounds it (controller_blending).
+  std::vector<BlendAllowance> rounding = {};
+  /// Rotation from the tool frame of the input to that of the chain; given: rotations are compared
+  /// whole (task = "pose").
+  std::optional<Mat3> whole_rotation = {};
 };
 
 /// The output's text, read back, against the input: tip and tool axis everywhere along every block

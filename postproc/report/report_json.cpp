@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
+#include "kernels/core/units.h"
 #include "machines/dialects/decimal.h"
 
 namespace smoothpost {
@@ -72,9 +74,55 @@ Json axis_json(const AxisSummary& a) {
           {"rounding_jerk", nullptr}};
 }
 
+Json corner_json(const SmoothedCorner& c) {
+  const bool acr = c.method == "acr";
+  return {{"input_line", c.input_line},
+          {"turn_deg", number(degrees_from_radians(c.turn))},
+          {"method", c.method},
+          {"kappa", acr ? Json(number(c.shape.kappa)) : Json(nullptr)},
+          {"lambda", acr ? Json(number(c.shape.lambda)) : Json(nullptr)},
+          {"c1", c.method == "ramp" ? Json(number(c.c1)) : Json(nullptr)},
+          {"half_width_mm", number(c.half_width)},
+          {"rotation_half_width_mm", number(c.rotation_half_width)},
+          {"tip_deviation_mm", number(c.tip_deviation)},
+          {"rotation_deviation_deg", number(degrees_from_radians(c.rotation_deviation))},
+          {"axis_deviation_deg", number(degrees_from_radians(c.axis_deviation))},
+          {"speed_mm_per_s", number(c.speed)}};
+}
+
+/// The list, cut to the corners that deviate most (in path order) when it is longer than `most`.
+Json corners_json(const std::vector<SmoothedCorner>& corners, std::size_t most) {
+  std::vector<std::size_t> shown(corners.size());
+  std::iota(shown.begin(), shown.end(), std::size_t{0});
+  if (shown.size() > most) {
+    std::stable_sort(shown.begin(), shown.end(), [&](std::size_t a, std::size_t b) {
+      return corners[a].tip_deviation > corners[b].tip_deviation;
+    });
+    shown.resize(most);
+    std::sort(shown.begin(), shown.end());
+  }
+  Json list = Json::array();
+  for (const std::size_t i : shown) list.push_back(corner_json(corners[i]));
+  return list;
+}
+
 std::string dump(const Json& json) {
   // Invalid UTF-8 in a comment or file name must not lose the report.
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+Json placement_json(const PlacementReport& placement) {
+  const auto margins = [](const std::vector<PlacementReport::Margin>& list) {
+    Json out = Json::array();
+    for (const auto& m : list)
+      out.push_back({{"name", m.name}, {"value", number(m.value)}, {"input_line", m.input_line}});
+    return out;
+  };
+  return {{"found", placement.found},
+          {"work_offset", placement.work_offset},
+          {"evaluations", placement.evaluations},
+          {"before", margins(placement.before)},
+          {"after", margins(placement.after)}};
 }
 
 }  // namespace
@@ -114,6 +162,7 @@ std::string report_json(const Conversion& c, const ReportContext& context) {
                 {"cuts", c.cuts.size()},
                 {"links", c.links},
                 {"cutter_locations", context.cutter_locations},
+                {"merged_points", c.merged_points},
                 {"length_mm", number(c.length)}};
   j["output"] = {{"lines", std::count(c.program.begin(), c.program.end(), '\n')},
                  {"blocks", c.blocks},
@@ -124,10 +173,13 @@ std::string report_json(const Conversion& c, const ReportContext& context) {
   Json cuts = Json::array();
   for (std::size_t i = 0; i < std::min(c.cuts.size(), kMostCuts); ++i)
     cuts.push_back(cut_json(c.cuts[i]));
-  j["corners"] = Json::array();  // this version smooths none
+  constexpr std::size_t kMostCorners = 10000;
+  j["corners"] = corners_json(c.corners, kMostCorners);
+  if (c.corners.size() > kMostCorners) j["corners_in_all"] = c.corners.size();
   j["cuts"] = std::move(cuts);
   j["time_s"] = {{"programmed", number(c.programmed_time)},
                  {"scheduled", number(c.scheduled_time)}};
+  if (context.placement) j["placement"] = placement_json(*context.placement);
   j["diagnostics"] = std::move(diagnostics);
   if (context.timings) {
     Json stages = Json::array();
@@ -143,7 +195,7 @@ std::string line_map_json(const LineMap& map, const std::string& input_file) {
   std::string text = "{\"schema\": 1, \"input\": " +
                      Json(input_file).dump(-1, ' ', false, Json::error_handler_t::replace) +
                      ",\n\"columns\": [\"output_line\", \"input_line\", \"role\", \"segment\", "
-                     "\"from\", \"to\"],\n\"rows\": [";
+                     "\"from\", \"to\", \"from_segment\"],\n\"rows\": [";
   for (std::size_t i = 0; i < map.size(); ++i) {
     const LineMapEntry& e = map[i];
     text += i ? ",\n[" : "\n[";
@@ -153,7 +205,7 @@ std::string line_map_json(const LineMap& map, const std::string& input_file) {
     append_decimal(text, e.from_share, 9);
     text += ',';
     append_decimal(text, e.to_share, 9);
-    text += ']';
+    text += ',' + std::to_string(e.from_segment) + ']';
   }
   return text + "\n]}\n";
 }

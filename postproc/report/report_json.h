@@ -1,10 +1,26 @@
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "postproc/pipeline/convert.h"
 
 namespace smoothpost {
+
+/// Where a part was placed by smoothpost, with its margins (1: middle, 0: border) before and after.
+struct PlacementReport {
+  struct Margin {
+    std::string name;
+    double value = 0.0;
+    std::uint32_t input_line = 0;
+  };
+  bool found = false;       ///< false: work_offset is the best that was seen, and does not do
+  std::string work_offset;  ///< G54=x,y,z,a,b,c
+  std::vector<Margin> before, after;
+  int evaluations = 0;
+};
 
 /// What the report says besides the conversion itself.
 struct ReportContext {
@@ -20,6 +36,7 @@ struct ReportContext {
   std::string program_sha256;
   std::string machine_sha256;
   bool timings = false;
+  std::optional<PlacementReport> placement;  ///< place, --work-offset auto
 };
 
 /// The JSON report, schema 1 (docs/report.md). Numbers that are not finite become null; the same

@@ -51,6 +51,69 @@ TEST_CASE("krl reader: statements with their values and places", "[formats][robo
   CHECK(one("$BASE=BASE_DATA[1]").value == "BASE_DATA[1]");
   CHECK(one("WAIT SEC 0.3").number == 0.3);
   CHECK(one("HALT").kind == Statement::Kind::halt);
+  const auto path = one("trigger when path=-2.5 delay=-4 do $OUT[1]=TRUE");
+  CHECK(path.by_path);
+  CHECK(path.distance == 1);
+  CHECK(path.path == -2.5);
+  CHECK(path.number == -4.0);
+}
+
+TEST_CASE("krl reader: spline blocks", "[formats][robot]") {
+  const auto parsed = body(
+      "SPLINE WITH $VEL.CP=0.05\nSPL {X 1,Y 2,Z 3,A 4,B 5,C 6}\n; a comment\n"
+      "TRIGGER WHEN PATH=0 ONSTART DELAY=0 DO $OUT[1]=TRUE\n"
+      "SPL {X 2,Y 2,Z 3,A 4,B 5,C 6,E1 7} WITH $VEL.CP = 0.025\nENDSPLINE\n"
+      "spline\nspl {x 1,y 2,z 3,a 4,b 5,c 6}\nendspline");
+  for (const auto& d : parsed.diagnostics) UNSCOPED_INFO(to_string(d));
+  REQUIRE(parsed.diagnostics.empty());
+  const auto& s = parsed.program.statements;
+  REQUIRE(s.size() == 8);
+  CHECK(s[0].kind == Statement::Kind::spline_begin);
+  CHECK(s[0].speed == 0.05);
+  CHECK(s[1].kind == Statement::Kind::motion);
+  CHECK(s[1].name == "SPL");
+  CHECK_FALSE(s[1].speed);
+  CHECK(s[2].by_path);
+  CHECK(s[2].distance == 0);
+  CHECK(s[2].path == 0.0);
+  CHECK(s[3].speed == 0.025);
+  CHECK(s[3].aggregate.find("E1") == 7.0);
+  CHECK(s[4].kind == Statement::Kind::spline_end);
+  CHECK_FALSE(s[5].speed);
+}
+
+TEST_CASE("krl reader: malformed spline blocks are refused", "[formats][robot]") {
+  const std::string point = "SPL {X 1,Y 2,Z 3,A 4,B 5,C 6}";
+  const std::vector<std::string> bad = {
+      "SPLINE\nENDSPLINE",
+      "SPLINE\n" + point,
+      "ENDSPLINE",
+      point,
+      "SPLINE\n" + point + "\nSPLINE\nENDSPLINE",
+      "SPLINE\n" + point + " C_DIS\nENDSPLINE",
+      "SPLINE\n" + point + "\nENDSPLINE C_SPL",
+      "SPLINE WITH $VEL.CP=0\n" + point + "\nENDSPLINE",
+      "SPLINE WITH $VEL.CP=-1\n" + point + "\nENDSPLINE",
+      "SPLINE WITH $VEL.CP\n" + point + "\nENDSPLINE",
+      "SPLINE WITH $ACC.CP=1\n" + point + "\nENDSPLINE",
+      "SPLINE\n" + point + " WITH $VEL.CP=0.1,$ACC.CP=1\nENDSPLINE",
+      "SPLINE\nSPL {X 1,Y 2,Z 3,A 4,B 5}\nENDSPLINE",
+      "SPLINE\nSPL {A1 1}\nENDSPLINE",
+      "SPLINE\nLIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n" + point + "\nENDSPLINE",
+      "SPLINE\n$OUT[1]=TRUE\n" + point + "\nENDSPLINE",
+      "SPLINE\nWAIT SEC 1\n" + point + "\nENDSPLINE",
+      "SPLINE\nTRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE\n" + point + "\nENDSPLINE",
+      "TRIGGER WHEN PATH= DELAY=0 DO $OUT[1]=TRUE",
+      "TRIGGER WHEN PATH=0 ONEND DELAY=0 DO $OUT[1]=TRUE",
+      "TRIGGER WHEN SPEED=0 DELAY=0 DO $OUT[1]=TRUE",
+      "TRIGGER WHEN DISTANCE=0 DELAY=0 DO ENDSPLINE",
+  };
+  for (const auto& text : bad) {
+    INFO(text);
+    const auto parsed = body(text);
+    REQUIRE_FALSE(parsed.diagnostics.empty());
+    CHECK(parsed.diagnostics[0].code.substr(0, 4) == "NC32");
+  }
 }
 
 TEST_CASE("krl reader: reads a program written for a KR C4", "[formats][robot]") {

@@ -55,7 +55,7 @@ TEST_CASE("arm_plan: samples and the motion between them follow the reference",
       const ReferencePath reference(path, {});
       JointPlanSettings settings = settings_for(machine);
       settings.tool_moves = tool_moves;
-      const auto plan = plan_arm(reference, arm, settings, {});
+      const auto plan = plan_arm(SmoothedPath(reference), arm, settings, {});
       for (const auto& d : plan.diagnostics()) UNSCOPED_INFO(to_string(d));
       REQUIRE(plan.ok());
       const auto& samples = plan.value().samples;
@@ -111,7 +111,7 @@ TEST_CASE("arm_plan: a given rotation about the tool axis is kept",
   for (const double spin : {-1.2, -0.8, -0.1, 0.0, 0.5, 1.0}) {
     JointPlanSettings settings = settings_for(machine);
     settings.spin = spin;
-    const auto plan = plan_arm(reference, arm, settings, {});
+    const auto plan = plan_arm(SmoothedPath(reference), arm, settings, {});
     INFO("spin " << spin);
     for (const auto& d : plan.diagnostics()) UNSCOPED_INFO(to_string(d));
     REQUIRE(plan.ok());  // at -0.1 the wrist passes a singular posture closely
@@ -141,12 +141,12 @@ TEST_CASE("arm_plan: the chosen rotation makes a way where there is one",
     const ToolPath path = milled(40.0);
     const ReferencePath reference(path, {});
     JointPlanSettings settings = settings_for(machine);
-    const auto plan = plan_arm(reference, arm, settings, {});
+    const auto plan = plan_arm(SmoothedPath(reference), arm, settings, {});
     const bool chosen = plan.ok();
     bool any = false;
     for (int k = 0; k < 24; ++k) {
       settings.spin = 2.0 * kPi * k / 24;
-      const bool ok = plan_arm(reference, arm, settings, {}).ok();
+      const bool ok = plan_arm(SmoothedPath(reference), arm, settings, {}).ok();
       any = any || ok;
       if (k == 0) zero_ok += ok;
     }
@@ -165,14 +165,15 @@ TEST_CASE("arm_plan: no way is told with code and line", "[postproc][pipeline][a
   const auto machine = shipped_machine("robot_6r");
   const ToolPath path = milled(40.0);
   const ReferencePath reference(path, {});
-  const auto far =
-      plan_arm(reference, arm_at(machine, shifted(5000, 0, 0)), settings_for(machine), {});
+  const auto far = plan_arm(SmoothedPath(reference), arm_at(machine, shifted(5000, 0, 0)),
+                            settings_for(machine), {});
   REQUIRE_FALSE(far.ok());
   CHECK(far.diagnostics().front().code == "KN101");
   CHECK(far.diagnostics().front().where.line > 0);
   CHECK(far.diagnostics().front().where.file == "part.ngc");
   Progress stop;
   stop.report = [](const char*, double) { return false; };
-  CHECK_FALSE(
-      plan_arm(reference, arm_at(machine, Pose::Identity()), settings_for(machine), stop).ok());
+  CHECK_FALSE(plan_arm(SmoothedPath(reference), arm_at(machine, Pose::Identity()),
+                       settings_for(machine), stop)
+                  .ok());
 }

@@ -59,7 +59,7 @@ typedef int (*smoothpost_progress)(void* user, const char* stage, double share);
 /* Every option of the command line under its name there; NULL or 0 means not given. */
 typedef struct smoothpost_options {
   size_t size; /* sizeof(smoothpost_options) of the caller; set by smoothpost_options_init */
-  const char* command;          /* convert | check | machines | formats | golden */
+  const char* command;          /* convert | check | place | machines | formats | golden */
   const char* const* arguments; /* words after the command: list, show NAME, run DIR */
   size_t argument_count;
   const char* input; /* a path; with input_data only a name for messages */
@@ -106,6 +106,8 @@ typedef struct smoothpost_options {
   smoothpost_progress progress;
   void* progress_user;
   const char* integer_unit; /* fanuc, haas: what one unit of a number without point is: 1 | 0.001 */
+  const char* box;  /* place: x0,y0,z0,x1,y1,z1: where the program's zero may lie, mm */
+  const char* turn; /* place: largest turn about the vertical, deg */
 } smoothpost_options;
 
 /* All members to "not given". `size` is sizeof(smoothpost_options) as the caller knows it. */
@@ -130,7 +132,7 @@ SMOOTHPOST_API const char* smoothpost_result_line_map(const smoothpost_result* r
                                                       size_t* size);
 SMOOTHPOST_API const char* smoothpost_result_trajectory(const smoothpost_result* result,
                                                         size_t* size);
-/* Text for people: of machines, formats and golden. */
+/* Text for people: of place, machines, formats and golden. */
 SMOOTHPOST_API const char* smoothpost_result_text(const smoothpost_result* result, size_t* size);
 SMOOTHPOST_API const char* smoothpost_result_verdict(const smoothpost_result* result);
 /* One line: verdict, checks, deviations, time. */
