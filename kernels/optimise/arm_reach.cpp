@@ -80,14 +80,19 @@ ArmReach::Nearest ArmReach::nearest(const Pose& X_WT, int side) const {
 }
 
 double ArmReach::singular(const JointVector& q) const {
-  require(q.size() == 6, "ArmReach::singular: one value per joint");
+  const Posture p = posture(q);
+  return std::min({p.elbow, p.wrist, p.shoulder});
+}
+
+ArmReach::Posture ArmReach::posture(const JointVector& q) const {
+  require(q.size() == 6, "ArmReach: one value per joint");
   const double elbow = std::abs(bend_[0] * std::cos(q[2]) + bend_[1] * std::sin(q[2]));
   const double wrist = std::abs(hand_[0] * std::cos(q[4]) + hand_[1] * std::sin(q[4]));
   // X of the wrist centre: A + e^(iq2) (U + e^(i s q3) V).
   const double c3 = std::cos(q[2]), s3 = elbow_turn_ * std::sin(q[2]);
   const Planar span{up_.z + out_.z * c3 - out_.x * s3, up_.x + out_.z * s3 + out_.x * c3};
   const double x = second_.x + span.z * std::sin(q[1]) + span.x * std::cos(q[1]);
-  return std::min({elbow, wrist, std::abs(x) / length(), 1.0});
+  return {wrist, elbow, std::min(1.0, std::abs(x) / length())};
 }
 
 Vec3 ArmReach::centre() const { return to_arm_.transpose() * (Vec3(0.0, 0.0, second_.z) - shift_); }

@@ -42,6 +42,12 @@ class ArmReach {
   /// @pre q.size() == 6   @throws ContractViolation if not.
   double singular(const JointVector& q) const;
 
+  /// The three measures that singular() is the least of.
+  struct Posture {
+    double wrist = 0.0, elbow = 0.0, shoulder = 0.0;
+  };
+  Posture posture(const JointVector& q) const;
+
   /// |U| + |V|, mm.
   double length() const { return upper_ + fore_; }
   /// Centre, in W, of the ball that holds every place of the tip, and its radius, mm.

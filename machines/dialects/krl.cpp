@@ -19,6 +19,7 @@ constexpr double kFirstPercent = 10.0;  // of $VEL_AXIS, from wherever the robot
 constexpr double kLinkPercent = 100.0;
 constexpr double kLinkSpeed = 0.25;         // m/s, of links whose tip goes straight
 constexpr double kLeastOrientation = 60.0;  // deg/s
+constexpr double kLeastTurnRate = 1e-3;     // deg/s: below it the move stands still
 constexpr double kNoLength = 1e-6;          // mm: a move that only turns
 constexpr double kMetresPerMillimetre = 1e-3;
 constexpr double kMillisecondsPerSecond = 1e3;
@@ -307,7 +308,8 @@ class Emitter {
     const double length = length_to(move);
     const double degrees = degrees_from_radians(turn(last_pose_, move.tool));
     if (length < kNoLength) {
-      if (degrees > 0.0) text_.set_orientation_speed(degrees / time);
+      const double rate = degrees / time;
+      text_.set_orientation_speed(rate >= kLeastTurnRate ? rate : orientation_limit_);
       const std::string last = text_.last("$VEL.CP");
       if (last.empty() || last == "SP_LINK") text_.set("$VEL.CP", decimal(kLinkSpeed, 3));
       return 0.0;

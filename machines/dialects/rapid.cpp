@@ -8,6 +8,7 @@
 #include "kernels/kinematics/screw_chain.h"
 #include "machines/dialects/decimal.h"
 #include "machines/dialects/event_text.h"
+#include "machines/dialects/rapid_items.h"
 #include "machines/dialects/rapid_text.h"
 
 namespace smoothpost::rapid {
@@ -15,7 +16,6 @@ namespace smoothpost::rapid {
 namespace {
 
 constexpr std::size_t kMaxComment = 120;
-constexpr std::size_t kMostTriggers = 8;
 constexpr std::uint32_t kMostLines = 5000;
 constexpr std::uint32_t kProcedureLines = 1000;
 constexpr int kMostProcedures = 500;
@@ -31,14 +31,6 @@ constexpr double kLargestSpeed = 5000.0;   // mm/s of VelSet, unless a move is f
 constexpr double kNoLength = 1e-6;         // mm: a move that only turns
 constexpr double kMargin = 1.05;
 
-/// What stands between two moves, in the words of the program.
-struct Item {
-  enum class Kind { comment, statement, wait, label, trigger } kind = Kind::comment;
-  std::string text;  // label: what the cut is called
-  Signal signal;     // trigger
-  double seconds = 0.0;
-};
-
 class Emitter {
  public:
   Emitter(const MachineDefinition& machine, const MachineProgram& program)
@@ -48,7 +40,6 @@ class Emitter {
         configuration_(machine),
         chain_(chain_of(machine, program.tool_length)) {
     chain_.workpiece_home = program.part;
-    items_.resize(program.moves.size() + 1);
     body_.reserve(160 * program.moves.size() + 4096);
   }
 
@@ -56,12 +47,7 @@ class Emitter {
     check_machine();
     if (has_error(diagnostics_)) return Result<EmittedProgram>::failure(std::move(diagnostics_));
     find_limits();
-    std::size_t action = 0;
-    for (std::size_t i = 0; i < items_.size(); ++i) {
-      const std::size_t first = action;
-      while (action < program_.actions.size() && program_.actions[action].before == i) ++action;
-      plan_items(first, action, i);
-    }
+    items_ = items_of(machine_, program_, diagnostics_);
     body();
     modes();
     finish();
@@ -153,84 +139,6 @@ class Emitter {
     double& limit = rotary ? rotary_limit_ : linear_limit_;
     const double value = std::abs(rotary ? degrees_from_radians(speed) : speed);
     limit = std::max(limit, kMargin * value);
-  }
-
-  // ---- events, from the last to the first: a trigger has no statement behind it in its place
-
-  void plan_items(std::size_t first, std::size_t last, std::size_t before) {
-    std::vector<std::optional<EventText>> words;
-    for (std::size_t k = first; k < last; ++k)
-      words.push_back(program_.actions[k].kind == MachineAction::Kind::event
-                          ? words_of(program_.actions[k])
-                          : std::nullopt);
-    auto& items = items_[before];
-    bool by_motion = before < program_.moves.size() && is_tool(program_.moves[before]);
-    bool stands = before == 0;
-    std::size_t triggers = 0;
-    for (std::size_t k = last; k-- > first;) {
-      const auto& action = program_.actions[k];
-      const auto& event = words[k - first];
-      using Kind = MachineAction::Kind;
-      if (action.kind == Kind::event && !event) continue;
-      if (action.kind == Kind::comment || (event && event->is_comment)) {
-        items.push_back({Item::Kind::comment, event ? event->text : action.text, {}, 0.0});
-        continue;
-      }
-      const auto signal = event ? trigger_of(*event) : std::nullopt;
-      if (signal && by_motion && triggers < kMostTriggers) {
-        items.push_back({Item::Kind::trigger, "", *signal, 0.0});
-        ++triggers;
-        continue;
-      }
-      if (event && event->on_the_fly && !stands) warn_of_stop(action, event->text);
-      put_statements(action, event, items);
-      by_motion = false;
-      stands = true;
-    }
-    std::reverse(items.begin(), items.end());
-  }
-
-  static std::optional<Signal> trigger_of(const EventText& event) {
-    if (!event.on_the_fly || event.dwell > 0.0) return std::nullopt;
-    return signal_of(event.text);
-  }
-
-  // In reverse.
-  static void put_statements(const MachineAction& action, const std::optional<EventText>& event,
-                             std::vector<Item>& items) {
-    if (event) {
-      if (event->dwell > 0.0) items.push_back({Item::Kind::wait, "", {}, event->dwell});
-      items.push_back({Item::Kind::statement, event->text, {}, 0.0});
-    } else if (action.kind == MachineAction::Kind::dwell) {
-      items.push_back({Item::Kind::wait, "", {}, action.seconds});
-    } else {
-      items.push_back({Item::Kind::label, action.text, {}, 0.0});
-    }
-  }
-
-  std::optional<EventText> words_of(const MachineAction& action) {
-    MachineAction plain = action;
-    for (auto& [name, value] : plain.event.parameters) {
-      std::replace(value.begin(), value.end(), '\\', '/');
-      std::replace(value.begin(), value.end(), '!', '.');
-    }
-    return event_text(machine_, plain, diagnostics_);
-  }
-
-  void warn_of_stop(const MachineAction& action, const std::string& text) {
-    tell("PR222",
-         "event " + action.event.name + " (" + text.substr(0, 64) +
-             ") is to act on the fly and the robot stops for it: only SetDO, SetGO and SetAO "
-             "name,number can be set by a motion, at most 8 at one place, and only by MoveL",
-         Severity::warning)
-        .where.line = static_cast<int>(action.input_line);
-  }
-
-  // The robot has to stand before what follows move i - 1.
-  bool stops_at(std::size_t i) const {
-    return std::any_of(items_[i].begin(), items_[i].end(), [](const Item& item) {
-      return item.kind != Item::Kind::comment && item.kind != Item::Kind::trigger;
-    });
   }
 
   // ---- procedures
@@ -386,16 +294,16 @@ class Emitter {
   }
 
   bool has_length(std::size_t i) const {
-    const auto& moves = program_.moves;
-    return (printed(moves[i].tool) - printed(moves[i - 1].tool)).norm() >= kNoLength;
+    const Pose from = pose_after(program_.moves[i - 1]);
+    return (printed(program_.moves[i].tool) - printed(from)).norm() >= kNoLength;
   }
 
   // A corner is rounded between two straight ways only.
   std::string zone(std::size_t i) {
     const auto& moves = program_.moves;
     const double radius = blend_radius(moves[i].blend);
-    if (radius <= 0.0 || i == 0 || i + 1 == moves.size() || stops_at(i + 1)) return "fine";
-    if (!is_tool(moves[i - 1]) || !is_tool(moves[i]) || !is_tool(moves[i + 1])) return "fine";
+    if (radius <= 0.0 || i == 0 || i + 1 == moves.size() || has_stop(items_[i + 1])) return "fine";
+    if (!is_tool(moves[i]) || !is_tool(moves[i + 1])) return "fine";
     if (!has_length(i) || !has_length(i + 1)) return "fine";
     const std::string r = decimal(radius, 5);
     const std::string turn = decimal(

@@ -41,7 +41,7 @@ struct Speed {
 class Reading {
  public:
   Reading(const MachineDefinition& machine, const std::string& file)
-      : machine_(machine), file_(file), axes_(robot_axes(machine)), events_(machine.process) {
+      : machine_(machine), file_(file), axes_(robot_axes(machine)), events_(rows_of(machine)) {
     joints_ = JointVector::Zero(machine.size());
     start_lines_ = packed_lines(machine.dialect.start);
     end_lines_ = packed_lines(machine.dialect.end);
@@ -77,6 +77,15 @@ class Reading {
   Diagnostics diagnostics;
 
  private:
+  // A ; at the end of a row is none of its words.
+  static ProcessTable rows_of(const MachineDefinition& machine) {
+    ProcessTable table = machine.process;
+    for (auto& row : table.events)
+      while (!row.text.empty() && (row.text.back() == ';' || row.text.back() == ' '))
+        row.text.pop_back();
+    return table;
+  }
+
   static std::set<std::string> packed_lines(const std::vector<std::string>& lines) {
     std::string text = "MODULE m PROC main()\n";
     for (const auto& line : lines) text += line + "\n";

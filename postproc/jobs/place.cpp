@@ -43,6 +43,27 @@ std::string reason_of(const Conversion& conversion) {
   return to_string(conversion.verdict);
 }
 
+/// The errors of a conversion when one of them would be the same at every place: all but those of
+/// motion (KN) and checks (CK).
+Diagnostics of_no_place(const Conversion& conversion) {
+  Diagnostics errors;
+  bool everywhere = false;
+  for (const auto& d : conversion.diagnostics) {
+    if (d.severity != Severity::error) continue;
+    errors.push_back(d);
+    everywhere = everywhere || (d.code.rfind("KN", 0) != 0 && d.code.rfind("CK", 0) != 0);
+  }
+  return everywhere ? errors : Diagnostics{};
+}
+
+/// With `digits` places always, for a column.
+std::string column(double value, int digits) {
+  std::string text = fixed(value, digits);
+  if (text.find('.') == std::string::npos) text += '.';
+  while (text.size() - text.find('.') <= static_cast<std::size_t>(digits)) text += '0';
+  return text;
+}
+
 }  // namespace
 
 Result<PlaceOptions> read_place_options(const Options& options) {
@@ -128,13 +149,11 @@ Result<PlacedConversion> first_certified(
       }
       return Result<PlacedConversion>(std::move(out), std::move(notes));
     }
+    const Diagnostics errors = of_no_place(out.conversion);
+    if (!errors.empty()) return Result<PlacedConversion>::failure(errors);
     refused += (refused.empty() ? "" : "; ") +
                work_offset_text(system, offset_of(places.best[i], system)) + ": " +
                reason_of(out.conversion);
-    const auto& diagnostics = out.conversion.diagnostics;
-    if (std::any_of(diagnostics.begin(), diagnostics.end(),
-                    [](const Diagnostic& d) { return d.code == "US190"; }))
-      return Result<PlacedConversion>::failure(found("US190", "cancelled"));
   }
   return Result<PlacedConversion>::failure(
       found("KN142",
@@ -154,8 +173,8 @@ std::string place_text(const Places& places, std::size_t place, int system) {
   };
   const auto row = [&](const std::string& name, const PlaceMargin* a, const PlaceMargin* b) {
     text += name + std::string(name.size() < 14 ? 14 - name.size() : 1, ' ');
-    text += cell(a ? fixed(a->value, 3) : "-", 10) + cell(a ? std::to_string(a->line) : "-", 13);
-    text += cell(b ? fixed(b->value, 3) : "-", 11) + cell(b ? std::to_string(b->line) : "-", 13);
+    text += cell(a ? column(a->value, 3) : "-", 10) + cell(a ? std::to_string(a->line) : "-", 13);
+    text += cell(b ? column(b->value, 3) : "-", 11) + cell(b ? std::to_string(b->line) : "-", 13);
     text += "\n";
   };
   const auto& before = places.before.all;

@@ -37,7 +37,8 @@ struct PlacedConversion {
 
 /// Converts at one place after the other, best first, until a program is certified; `convert_at` is
 /// given each place. Failures: KN141 (no place within reach and limits: says what is worst, and
-/// where), KN142 (places, but no certified program at any: says why for each). A note KN143 says
+/// where), KN142 (places, but no certified program at any: says why for each), or
+/// the errors of a conversion that no place would change. A note KN143 says
 /// which better places were passed over, and why.
 Result<PlacedConversion> first_certified(
     const Places& places, int system,

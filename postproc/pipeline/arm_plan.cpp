@@ -7,6 +7,7 @@
 #include "kernels/core/units.h"
 #include "kernels/kinematics/arm_tracking.h"
 #include "kernels/kinematics/inverse.h"
+#include "kernels/optimise/spin.h"
 #include "postproc/pipeline/plan_messages.h"
 #include "postproc/pipeline/tool_motion.h"
 
@@ -21,7 +22,9 @@ constexpr int kMaxSplits = 30;
 constexpr int kCloser = 16;  // parts of a motion that is looked at more closely
 constexpr int kCloserLooks = 2;
 constexpr int kSpins = 24;
-constexpr std::size_t kThinned = 160;  // points on which spins are compared
+constexpr std::size_t kThinned = 160;   // points on which spins are compared
+constexpr double kNearSingular = 0.05;  // of ArmReach::posture: about 3 deg of a wrist or an elbow
+constexpr double kTangentSpan = 50.0;   // mm of path for one number of a tangent profile
 constexpr double kOpposite = 20.0 * kRadiansPerDegree;
 
 /// The least rotation that takes unit vector a to unit vector b.
@@ -38,11 +41,18 @@ class ArmPlanner {
   /// With the first spin, best first, that has a way without a split; as the best one ends if none.
   Result<JointPlan> run() {
     collect();
+    measure_legs();
     choose_reference_axis();
     from_input_ = input_tool_rotation(arm_.chain().tool_axis, settings_.spin);
     const std::vector<double> spins = settings_.spin || settings_.whole_rotation
                                           ? std::vector<double>{settings_.spin.value_or(0.0)}
                                           : spins_by_score();
+    if (!settings_.whole_rotation && settings_.spin_policy == "tangent") follow_tangent();
+    if (!settings_.whole_rotation && settings_.spin_policy == "optimised") {
+      Result<JointPlan> plan = plan_optimised(spins.front());
+      if (cancelled_ || (plan.ok() && plan.value().splits.empty())) return plan;
+      profile_.reset();  // it knows no turns: the constants are tried as they are
+    }
     std::optional<Result<JointPlan>> first;
     for (const double spin : spins) {
       Result<JointPlan> plan = plan_with(spin);
@@ -53,6 +63,92 @@ class ArmPlanner {
   }
 
  private:
+  Result<JointPlan> plan_optimised(double spin) {
+    std::vector<SpinPoint> points;
+    for (const JointSample& t : thinned()) {
+      SpinPoint point;
+      point.tool = holder(t.segment, t.s, spin);
+      point.length = length_at(t.segment, t.s);
+      point.cut = !points.empty() && !replanned(t.segment);
+      points.push_back(point);
+    }
+    const SpinResult found = optimise_spin(arm_, points, 0.0);
+    profile_ = found.profile;
+    Result<JointPlan> plan = plan_with(spin);
+    if (plan.ok())
+      plan.value().spin_gain =
+          SpinGain{found.before.margin, found.after.margin, found.before.jerk, found.after.jerk};
+    return plan;
+  }
+
+  // The input tool frame's X along the way of the tip, as a smooth profile.
+  void follow_tangent() {
+    const Vec3 x_of_tool = input_tool_rotation(arm_.chain().tool_axis, {}) * Vec3::UnitX();
+    std::vector<double> lengths, angles;
+    for (std::size_t i = 1; i < tracked_.size(); ++i) {
+      const JointSample& t = tracked_[i];
+      if (replanned(t.segment)) continue;
+      const CutterLocation here = location(t.segment, t.s);
+      const Vec3 way = here.tip - location(t.segment, std::max(0.0, t.s - 1e-3)).tip;
+      const Vec3 tangent = way - here.axis * here.axis.dot(way);
+      if (tangent.norm() < 1e-9) continue;
+      const Vec3 x = holder(t.segment, t.s, 0.0).linear() * x_of_tool;
+      double angle = std::atan2(tangent.dot(here.axis.cross(x)), tangent.dot(x));
+      if (!angles.empty()) angle += 2.0 * kPi * std::round((angles.back() - angle) / (2.0 * kPi));
+      lengths.push_back(length_at(t.segment, t.s));
+      angles.push_back(angle);
+    }
+    if (lengths.empty()) return;
+    const double wanted = std::min(200.0, lengths.back() / kTangentSpan);
+    profile_ = spin_near(lengths, angles, std::max(6, static_cast<int>(wanted)));
+  }
+
+  double length_at(std::size_t leg, double s) const {
+    return leg_start_[leg] + s * (leg_start_[leg + 1] - leg_start_[leg]);
+  }
+
+  void measure_legs() {
+    leg_start_ = {0.0};
+    for (std::size_t leg = 0; leg <= path_.legs(); ++leg)
+      leg_start_.push_back(leg_start_.back() + (replanned(leg) ? 0.0 : path_.length(leg)));
+  }
+
+  std::vector<JointSample> thinned() const {
+    std::vector<JointSample> some;
+    const std::size_t step = tracked_.size() / kThinned + 1;
+    for (std::size_t i = 0; i < tracked_.size(); i += step) some.push_back(tracked_[i]);
+    some.push_back(tracked_.back());
+    return some;
+  }
+
+  // The nearest place of each stretch that passes a singular posture.
+  std::vector<SingularPlace> singular_places() const {
+    const ArmReach reach(arm_);
+    std::vector<SingularPlace> places;
+    std::array<bool, 3> inside{};
+    std::array<std::size_t, 3> last{};
+    for (const JointSample& sample : samples_) {
+      const ArmReach::Posture p = reach.posture(sample.q);
+      const std::array<std::pair<const char*, double>, 3> kinds = {
+          {{"wrist", p.wrist}, {"elbow", p.elbow}, {"shoulder", p.shoulder}}};
+      for (std::size_t k = 0; k < 3; ++k) {
+        const auto& [kind, value] = kinds[k];
+        if (value >= kNearSingular) {
+          inside[k] = false;
+          continue;
+        }
+        if (!inside[k]) {
+          inside[k] = true;
+          last[k] = places.size();
+          places.push_back({line_at(sample.segment), kind, value});
+        } else if (value < places[last[k]].measure) {
+          places[last[k]] = {line_at(sample.segment), kind, value};
+        }
+      }
+    }
+    return places;
+  }
+
   Result<JointPlan> plan_with(double spin) {
     spin_ = spin;
     samples_.clear();
@@ -116,6 +212,7 @@ class ArmPlanner {
       }
     }
     JointPlan plan;
+    plan.singular = singular_places();
     if (settings_.tool_moves)
       drop_guides(samples_, [this](const JointSample& a, const JointSample& b) {
         return (a.q - b.q).cwiseAbs().maxCoeff() < kLongestTurn && follows(a, b);
@@ -197,7 +294,10 @@ class ArmPlanner {
       pose.linear() = path_.rotation_at(segment, s) * from_input_.transpose();
     else
       pose.linear() =
-          least_rotation(reference_axis_, at.axis) * rotation_about(reference_axis_, spin) * home_;
+          least_rotation(reference_axis_, at.axis) *
+          rotation_about(reference_axis_,
+                         spin + (profile_ ? profile_->at(length_at(segment, s)) : 0.0)) *
+          home_;
     pose.translation() = at.tip;
     return holder_pose(arm_.chain(), pose, path_.point(segment).tool_length);
   }
@@ -228,14 +328,11 @@ class ArmPlanner {
 
   std::vector<double> spins_by_score() const {
     // Neighbours on the thinned path are far apart: only reach, limits and posture count there.
-    std::vector<JointSample> thinned;
-    const std::size_t step = tracked_.size() / kThinned + 1;
-    for (std::size_t i = 0; i < tracked_.size(); i += step) thinned.push_back(tracked_[i]);
-    thinned.push_back(tracked_.back());
+    const std::vector<JointSample> some = thinned();
     std::vector<std::pair<double, double>> scored;  // score, spin
     for (int k = 0; k < kSpins; ++k) {
       const double spin = 2.0 * kPi / kSpins * ((k % 2 == 1) ? -(k + 1) / 2 : k / 2);
-      scored.emplace_back(score_of(thinned, spin), spin);
+      scored.emplace_back(score_of(some, spin), spin);
     }
     std::stable_sort(scored.begin(), scored.end(),
                      [](const auto& a, const auto& b) { return a.first > b.first; });
@@ -245,10 +342,10 @@ class ArmPlanner {
   }
 
   // Of the branch that serves the whole thinned path best; unreachable points count −1 each.
-  double score_of(const std::vector<JointSample>& thinned, double spin) const {
+  double score_of(const std::vector<JointSample>& some, double spin) const {
     std::array<double, 8> score;
     score.fill(1.0);
-    for (const auto& t : thinned) {
+    for (const auto& t : some) {
       const SixRSolutions solved = arm_.solve(holder(t.segment, t.s, spin), settings_.held);
       for (std::size_t b = 0; b < 8; ++b) {
         double here = -1.0;
@@ -313,6 +410,8 @@ class ArmPlanner {
   Mat3 from_input_ = Mat3::Identity();
   Mat3 home_ = Mat3::Identity();  ///< rotation with the tool along the reference axis, ψ = 0
   double spin_ = 0.0;
+  std::optional<SpinProfile> profile_;  ///< added to spin_
+  std::vector<double> leg_start_;       ///< mm along the path, without links
   bool cancelled_ = false;
   std::vector<JointSample> tracked_;
   std::vector<JointSample> samples_;

@@ -267,6 +267,7 @@ class Converter {
     settings.may_split = in_.machine.links.rewind_in_cut;
     settings.tool_moves = turn_ != ToolTurn::none;
     settings.spin = in_.machine.recipe.spin;
+    settings.spin_policy = in_.machine.recipe.spin_policy;
     settings.whole_rotation = in_.machine.recipe.task == "pose";
     auto planned = plan_with(settings);
     // The second half starts a little before the place, so that it may need a split of its own.
@@ -279,6 +280,7 @@ class Converter {
     append(out_.diagnostics, planned.diagnostics());
     watch_.lap("kinematics");
     if (!planned.ok()) return false;
+    tell_posture(planned.value());
     BuiltProgram built =
         build_program({reference_, cuts_, in_.machine, chain_, part_box(), turn_, &*inverse_},
                       planned.value().samples);
@@ -358,6 +360,45 @@ class Converter {
     out_.diagnostics.push_back(diagnostic("LK103", out_.assumes.back(), in_.input_name,
                                           static_cast<int>(split_lines_.front())));
     out_.diagnostics.back().severity = Severity::warning;
+  }
+
+  void tell_posture(const JointPlan& plan) {
+    const auto say = [this](const char* code, Severity severity, std::string text,
+                            std::uint32_t line) {
+      out_.diagnostics.push_back(
+          diagnostic(code, std::move(text), in_.input_name, static_cast<int>(line)));
+      out_.diagnostics.back().severity = severity;
+    };
+    if (plan.spin_gain) {
+      const SpinGain& g = *plan.spin_gain;
+      say("KN131", Severity::note,
+          "rotation about the tool optimised: least margin of the joints " +
+              number(g.margin_before) + " before, " + number(g.margin_after) +
+              " after (share of the range); rms third difference of the joints " +
+              (g.jerk_before > 0.0 ? number(100.0 * g.jerk_after / g.jerk_before) : "100") +
+              " % of before",
+          0);
+    }
+    for (const std::string_view kind : {"wrist", "elbow", "shoulder"}) {
+      double least = 1.0;
+      std::uint32_t nearest = 0;
+      std::string lines;
+      std::size_t count = 0;
+      for (const SingularPlace& place : plan.singular) {
+        if (place.kind != kind) continue;
+        if (place.measure < least) nearest = place.line;
+        least = std::min(least, place.measure);
+        if (++count <= 8) lines += (count > 1 ? ", " : "") + std::to_string(place.line);
+      }
+      if (count == 0) continue;
+      if (count > 8) lines += " and " + std::to_string(count - 8) + " more";
+      say("KN132", Severity::warning,
+          "the arm passes near a singular " + std::string(kind) + " (measure " + number(least) +
+              ", 0 is singular, below 0.05 is told), input lines " + lines +
+              ": joints turn fast there and blocks are slowed to their limits. Another place of "
+              "the part (smoothpost place) or recipe.spin = \"optimised\" may avoid it",
+          nearest);
+    }
   }
 
   std::optional<PartBox> part_box() const {

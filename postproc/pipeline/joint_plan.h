@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "kernels/core/progress.h"
@@ -21,8 +22,9 @@ struct JointPlanSettings {
   std::vector<std::string> axis_names;  ///< for messages, in joint order
   bool tool_moves = false;              ///< the controller interpolates tip and axis, not joints
   bool whole_rotation = false;          ///< arms: the input's rotation about the tool counts too
-  std::optional<double> spin;           ///< rad, arms: the rotation about the tool axis (plan_arm)
-  bool may_split = false;               ///< a cut may be split where a rotary has to be unwound
+  std::string spin_policy = "fixed";  ///< arms, unless whole_rotation: fixed | tangent | optimised
+  std::optional<double> spin;         ///< rad, arms: the rotation about the tool axis (plan_arm)
+  bool may_split = false;             ///< a cut may be split where a rotary has to be unwound
 };
 
 /// Joint values on the way: at share `s` of `segment` (segment 0: the first path point).
@@ -59,9 +61,24 @@ void drop_guides(std::vector<JointSample>& samples, const Follows& follows) {
   if (!samples.empty()) samples.resize(kept + 1);
 }
 
+/// What a rotation about the tool that was optimised has gained (kernels/optimise/spin.h).
+struct SpinGain {
+  double margin_before = 0.0, margin_after = 0.0;
+  double jerk_before = 0.0, jerk_after = 0.0;  ///< rad/mm³
+};
+
+/// A place where an arm passes near a singular posture.
+struct SingularPlace {
+  std::uint32_t line = 0;  ///< of the input
+  std::string_view kind;   ///< wrist | elbow | shoulder
+  double measure = 0.0;    ///< 0: singular (ArmReach::posture)
+};
+
 struct JointPlan {
   std::vector<JointSample> samples;
-  std::vector<SplitPlace> splits;  ///< not empty: no samples; split there and plan again
+  std::optional<SpinGain> spin_gain;
+  std::vector<SingularPlace> singular;  ///< arms: the nearest of each stretch of one kind
+  std::vector<SplitPlace> splits;       ///< not empty: no samples; split there and plan again
 };
 
 /// Joint values along the whole path, close enough that straight joint motion from each

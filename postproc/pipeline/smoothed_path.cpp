@@ -361,6 +361,12 @@ PathPlace SmoothedPath::place(std::size_t leg, double s) const {
   return place_between(reference_, l.from, l.to, s);
 }
 
+double SmoothedPath::length(std::size_t leg) const {
+  const Leg& l = legs_[leg];
+  if (l.run >= 0) return runs_[static_cast<std::size_t>(l.run)].length(l.index);
+  return leg == 0 ? 0.0 : reference_.length(l.to.segment);
+}
+
 std::vector<double> SmoothedPath::breaks(std::size_t leg) const {
   const Leg& l = legs_[leg];
   if (l.run < 0) return {0.0, 1.0};

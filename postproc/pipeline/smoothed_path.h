@@ -69,6 +69,8 @@ class SmoothedPath {
   /// @pre full_pose()
   Mat3 rotation_at(std::size_t leg, double s) const;
   PathPlace place(std::size_t leg, double s) const;
+  /// Extent of a leg in the parameter σ, mm; 0 for leg 0.
+  double length(std::size_t leg) const;
   /// Ascending shares with 0 and 1: between two of them the leg has one formula.
   std::vector<double> breaks(std::size_t leg) const;
   /// Bounds of |d²/ds²| of tip and axis between two neighbouring breaks.

@@ -137,7 +137,7 @@ inline std::array<Vec3, 3> tip_by_arc_length(const PoseDerivatives& d) {
 }
 
 /// Differences of one-sided derivatives at all breaks and nodes, each over the peak of the same
-/// derivative in the two neighbouring stretches, less what the rounding of the parameter changes
+/// derivative on the two neighbouring legs, less what the rounding of the parameter changes
 /// (σ has a resolution of 1e-16 of the leg). Index 0 is the value (absolute).
 struct Jumps {
   std::array<double, 4> tip{};       ///< by σ
@@ -167,10 +167,11 @@ inline Derivatives rotation_of(const PoseDerivatives& d, bool arc) {
   return v;
 }
 
-/// One side of a junction: derivatives there and at samples of the stretch it belongs to.
+/// One side of a junction: derivatives there and at samples of the stretch and the leg it belongs to.
 struct Side {
   PoseDerivatives here;
   std::vector<PoseDerivatives> stretch;
+  std::vector<PoseDerivatives> leg;  ///< samples of the whole leg
   double step = 0.0;   ///< of the samples
   double inside = 0.0; ///< how far `here` is from the junction
   bool moves = false;
@@ -180,11 +181,16 @@ inline Side side(const CornerPath& path, std::size_t leg, std::array<double, 2> 
                  bool at_end) {
   Side s;
   const double width = range[1] - range[0];
-  s.inside = std::min(4e-16 * (at_end ? range[1] : path.length(leg)), 0.25 * width);
+  const bool node = at_end ? range[1] == path.length(leg) : range[0] == 0.0;
+  if (!node) s.inside = std::min(4e-16 * (at_end ? range[1] : path.length(leg)), 0.25 * width);
   s.here = path.derivatives(leg, at_end ? range[1] - s.inside : range[0] + s.inside);
   for (int i = 0; i <= 16; ++i)
     s.stretch.push_back(path.derivatives(leg, range[0] + width * (0.01 + 0.98 * i / 16.0)));
   s.step = 0.98 * width / 16.0;
+  const auto breaks = path.breaks(leg);
+  for (std::size_t k = 0; k + 1 < breaks.size(); ++k)
+    for (int i = 0; i <= 8; ++i)
+      s.leg.push_back(path.derivatives(leg, breaks[k] + (breaks[k + 1] - breaks[k]) * i / 8.0));
   s.moves = path.tip_moves(leg);
   return s;
 }
@@ -210,11 +216,15 @@ void compare(const Side& a, const Side& b, By by, Of of, std::array<double, 4>& 
   std::array<double, 4> resolution{};
   for (const Side* s : {&a, &b}) {
     Derivatives before = of(s->stretch.front(), arc);
-    for (const PoseDerivatives& d : s->stretch) {
+    for (const PoseDerivatives& d : s->leg) {
       const Derivatives plain = of(d, false);
       const Derivatives now = of(d, arc);
+      for (std::size_t k = 1; k < 4; ++k)
+        peak[k] = std::max(peak[k], arc ? arc_scale(d, plain, now, k) : plain[k].norm());
+    }
+    for (const PoseDerivatives& d : s->stretch) {
+      const Derivatives now = of(d, arc);
       for (std::size_t k = 0; k < 4; ++k) {
-        if (k > 0) peak[k] = std::max(peak[k], arc ? arc_scale(d, plain, now, k) : plain[k].norm());
         resolution[k] = std::max(resolution[k],
                                  6.0 * s->inside * (now[k] - before[k]).norm() / s->step);
       }
@@ -236,7 +246,7 @@ inline void compare(const Side& a, const Side& b, Jumps& jumps) {
   compare(a, b, By::parameter, tip_of, jumps.tip);
   compare(a, b, By::parameter, rotation_of, jumps.rotation);
   for (const Side* s : {&a, &b})
-    for (const PoseDerivatives& d : s->stretch)
+    for (const PoseDerivatives& d : s->leg)
       if (s->moves) jumps.slowest = std::min(jumps.slowest, d.tip[1].norm());
   if (!a.moves || !b.moves) return;
   compare(a, b, By::arc_length, tip_of, jumps.tip_arc);

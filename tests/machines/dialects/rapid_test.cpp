@@ -161,10 +161,11 @@ bool is_tool(const MachineMove& move) { return move.interpolation == MoveInterpo
 bool may_blend(const MachineProgram& program, std::size_t i) {
   const auto& moves = program.moves;
   if (i == 0 || i + 1 >= moves.size()) return false;
-  for (const std::size_t k : {i - 1, i, i + 1})
-    if (!is_tool(moves[k])) return false;
+  if (!is_tool(moves[i]) || !is_tool(moves[i + 1])) return false;
   for (const std::size_t k : {i, i + 1})
-    if ((moves[k].tool.translation() - moves[k - 1].tool.translation()).norm() < 1e-4) return false;
+    if (is_tool(moves[k - 1]) &&
+        (moves[k].tool.translation() - moves[k - 1].tool.translation()).norm() < 1e-4)
+      return false;
   for (const auto& a : program.actions) {
     const bool flies =
         a.kind == Kind::event &&
@@ -347,10 +348,10 @@ TEST_CASE("rapid: configuration data from their definition", "[machines][dialect
   }
   for (const int count : seen) CHECK(count > 0);
   JointVector q = JointVector::Zero(6);
-  CHECK(configuration.text(q) == "[0,0,0,0]");
+  CHECK(configuration.text(q) == "[0,0,0,2]");  // the wrist is above the stretched lower arm
   q << radians_from_degrees(-0.5), 0, 0, radians_from_degrees(90.0), -0.1,
       radians_from_degrees(-350);
-  CHECK(configuration.text(q) == "[-1,1,-4,1]");
+  CHECK(configuration.text(q) == "[-1,1,-4,3]");
   q[0] = -1e-15;
   CHECK(configuration.at(q)[0] == 0);
   // A track in front of the arm changes nothing.
@@ -409,7 +410,7 @@ TEST_CASE("rapid: events on the fly are set by TriggL and others are statements"
   CHECK(contains(text, "    TriggIO spT1, 0\\Start\\DOp:=doLaser, 1;\n"));
   CHECK(contains(text, "    TriggIO spT2, 0\\Start\\AOp:=aoPower, 45;\n"));
   CHECK_FALSE(contains(text, "TriggEquip"));
-  CHECK(contains(text, ", spT2\\T2:=spT3, spZ1, spTool"));
+  CHECK(contains(text, ", spT2\\T2:=spT3, fine, spTool"));
   CHECK(contains(text, "  VAR triggdata spT3;\n"));
   // The robot waits behind this one: a trigger would come after the wait.
   CHECK(contains(text, "\n    SetDO doLaser,0;\n    WaitTime\\InPos, 0.25;\n"));
