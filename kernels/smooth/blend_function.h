@@ -17,12 +17,13 @@ struct BlendValue {
 ///  - acr: the paper's corner curve. The control points of [Cai2025] Eq. (14) are affine in the
 ///    corner, so the curve is h·(−a(t)·T0 + b(t)·T1) with a, b ACR splines of the weights of
 ///    acr_spline.h; σ = h(b − a), h·g = h·b. reach = 3/2, g(0) = 1/4; not monotone (it undershoots
-///    to about −0.0059 and dg/du lies in [−0.033, 1.033] for κ = λ = 1/2; [−0.1, 1.1] for all shapes).
+///    to about −0.0059 and dg/du lies in [−0.033, 1.033] for κ = λ = 1/2; [−0.1, 1.1] for all
+///    shapes).
 ///  - ramp: g'' = (1−u²)²(c0 + c1·u²), c0 = 15/16 − c1/7. reach = 1, g(0) = c0/6 + c1/24; convex.
 ///
 /// Guarantees (tests): limits with value, slope 0 or 1, second and third derivative 0; C³ at every
-/// inner knot; the symmetry above; |g(−u)| ≤ g(0)·(1 − u/reach) for u ≥ 0; acr equals the spline through
-/// acr_corner_points() as a curve; ramp convex; derivatives equal central differences.
+/// inner knot; the symmetry above; |g(−u)| ≤ g(0)·(1 − u/reach) for u ≥ 0; acr equals the spline
+/// through acr_corner_points() as a curve; ramp convex; derivatives equal central differences.
 /// Units: none.   Cost: acr about 0.3 µs (a Newton iteration on a monotone septic), ramp 10 ns; no
 /// allocation.
 class BlendFunction {

@@ -9,10 +9,10 @@ namespace smoothpost {
 
 namespace {
 
-constexpr double kNoMotion = 1e-9;  // mm
-constexpr double kNoTurn = 1e-12;   // rad
-constexpr double kStraight = 1e-9;  // of |T1 − T0|: no corner
-constexpr double kJoined = 1e-6;    // mm and rad: legs lead from node to node
+constexpr double kNoMotion = 1e-9;    // mm
+constexpr double kNoTurn = 1e-12;     // rad
+constexpr double kStraight = 1e-9;    // of |T1 − T0|: no corner
+constexpr double kJoined = 1e-6;      // mm and rad: legs lead from node to node
 constexpr double kSameBreak = 1e-13;  // of a leg
 constexpr int kBisections = 40;
 constexpr double kMostSlope = 1.1;  // of a blend function, see blend_function.h
@@ -278,9 +278,7 @@ double CornerPath::axis_deviation(std::size_t node, double half_width) const {
   const Vec3 in = rate(leg_before(node));
   const Vec3 out = rate(leg_after(node));
   const Vec3 jump = out - in;
-  const auto across = [this](const Vec3& v) {
-    return settings_.tool_axis->cross(v).norm();
-  };
+  const auto across = [this](const Vec3& v) { return settings_.tool_axis->cross(v).norm(); };
   const double turned = half_width * rotation_blend_.at_zero();
   const double extent = half_width * rotation_blend_.reach();
   const Vec3 twist = in.cross(out);

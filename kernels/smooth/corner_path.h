@@ -77,7 +77,8 @@ struct PoseDerivatives {
 ///
 /// Half widths: h·g(0)·(|T1 − T0| + reach·h·K/2) = tip_tolerance with K the sum of the legs'
 /// curvatures, h'·g(0)·|w1 − w0| = rotation_tolerance (tool_axis: of the part of w1 − w0 across
-/// it, less where turns about the tool and across it together would move the axis further). Two neighbours that want more of a leg than there is share it by their curvature, k =
+/// it, less where turns about the tool and across it together would move the axis further). Two
+/// neighbours that want more of a leg than there is share it by their curvature, k =
 /// sin(θ/2)/cos²(θ/2) (rotation: |w1 − w0|): each takes at least its share, at most what the other
 /// leaves, never more than the leg together. Tip and rotation do so apart from each other: their
 /// windows may overlap in any order, at one corner and between neighbours, because they are two

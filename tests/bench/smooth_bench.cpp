@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-
 #include "tests/kernels/smooth/paths.h"
 
 // Blending corners: planning (construction), planning with a measured certificate, evaluation.

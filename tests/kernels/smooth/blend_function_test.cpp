@@ -183,8 +183,8 @@ TEST_CASE("blend_function: ramp in closed form", "[kernels][smooth]") {
   CHECK(g.at_zero() == Approx(5.0 / 32.0).epsilon(1e-15));
   for (const double u : inner(g, 500, 34)) {
     const double u2 = u * u;
-    REQUIRE(std::abs(g.at(u).value -
-                     (5 + 16 * u + 15 * u2 - 5 * u2 * u2 + u2 * u2 * u2) / 32) < 1e-15);
+    REQUIRE(std::abs(g.at(u).value - (5 + 16 * u + 15 * u2 - 5 * u2 * u2 + u2 * u2 * u2) / 32) <
+            1e-15);
     REQUIRE(std::abs(g.at(u).d2 - 15.0 / 16.0 * (1 - u2) * (1 - u2)) < 1e-15);
   }
 }

@@ -50,9 +50,9 @@ Deviation deviation(const std::vector<MergePoint>& p, const std::vector<std::uin
         worst.tip = std::max(worst.tip, (tip - (a.tip + share * (b.tip - a.tip))).norm());
         worst.axis = std::max(worst.axis, angle_between(great_circle(p[i].axis, p[i + 1].axis, t),
                                                         great_circle(a.axis, b.axis, share)));
-        worst.rotation = std::max(worst.rotation,
-                                  p[i].rotation.slerp(t, p[i + 1].rotation)
-                                      .angularDistance(a.rotation.slerp(share, b.rotation)));
+        worst.rotation =
+            std::max(worst.rotation, p[i].rotation.slerp(t, p[i + 1].rotation)
+                                         .angularDistance(a.rotation.slerp(share, b.rotation)));
       }
   }
   return worst;
@@ -86,8 +86,7 @@ TEST_CASE("merge_points: deviation at equal share is within the tolerances", "[k
 TEST_CASE("merge_points: kept points stay", "[kernels][smooth]") {
   const auto points = wavy(500, 91, 7);
   const auto kept = merge_points(points, {1.0, 0.1});
-  for (std::uint32_t i = 0; i < 500; i += 7)
-    CHECK(std::binary_search(kept.begin(), kept.end(), i));
+  for (std::uint32_t i = 0; i < 500; i += 7) CHECK(std::binary_search(kept.begin(), kept.end(), i));
 }
 
 TEST_CASE("merge_points: repeated points", "[kernels][smooth]") {

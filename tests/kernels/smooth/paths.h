@@ -100,10 +100,8 @@ inline Deviation deviation(const PathText& text, const CornerPath& path, int sam
       const Pose b = text.pose(leg, x / length);
       worst.tip = std::max(worst.tip, (a.translation() - b.translation()).norm());
       const Eigen::Quaterniond d(Mat3(a.linear().transpose() * b.linear()));
-      worst.rotation =
-          std::max(worst.rotation, 2.0 * std::atan2(d.vec().norm(), std::abs(d.w())));
-      worst.axis =
-          std::max(worst.axis, angle_between(a.linear() * axis, b.linear() * axis));
+      worst.rotation = std::max(worst.rotation, 2.0 * std::atan2(d.vec().norm(), std::abs(d.w())));
+      worst.axis = std::max(worst.axis, angle_between(a.linear() * axis, b.linear() * axis));
     };
     for (int i = 0; i <= samples; ++i) measure(length * i / samples);
     const auto breaks = path.breaks(leg);
@@ -167,13 +165,14 @@ inline Derivatives rotation_of(const PoseDerivatives& d, bool arc) {
   return v;
 }
 
-/// One side of a junction: derivatives there and at samples of the stretch and the leg it belongs to.
+/// One side of a junction: derivatives there and at samples of the stretch and the leg it belongs
+/// to.
 struct Side {
   PoseDerivatives here;
   std::vector<PoseDerivatives> stretch;
   std::vector<PoseDerivatives> leg;  ///< samples of the whole leg
-  double step = 0.0;   ///< of the samples
-  double inside = 0.0; ///< how far `here` is from the junction
+  double step = 0.0;                 ///< of the samples
+  double inside = 0.0;               ///< how far `here` is from the junction
   bool moves = false;
 };
 
@@ -225,8 +224,8 @@ void compare(const Side& a, const Side& b, By by, Of of, std::array<double, 4>& 
     for (const PoseDerivatives& d : s->stretch) {
       const Derivatives now = of(d, arc);
       for (std::size_t k = 0; k < 4; ++k) {
-        resolution[k] = std::max(resolution[k],
-                                 6.0 * s->inside * (now[k] - before[k]).norm() / s->step);
+        resolution[k] =
+            std::max(resolution[k], 6.0 * s->inside * (now[k] - before[k]).norm() / s->step);
       }
       before = now;
     }

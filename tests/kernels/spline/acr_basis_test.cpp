@@ -15,12 +15,12 @@ namespace {
 
 /// Eq. (6) and (7) of the paper with Eq. (7) as the rows of a table, lowest power first.
 constexpr std::array<std::array<double, 8>, 6> kPrinted = {{
-    {0, -1, 0, 0, 20, -45, 36, -10},   // l0
-    {0, 0, 0, 0, 15, -39, 34, -10},    // l1
-    {0, 0, 1, 0, -10, 20, -15, 4},     // m0
-    {0, 0, -2, 0, 25, -54, 43, -12},   // m1
-    {0, 0, 1, 0, -20, 48, -41, 12},    // m2
-    {1, 0, 0, 0, -35, 84, -70, 20},    // n1
+    {0, -1, 0, 0, 20, -45, 36, -10},  // l0
+    {0, 0, 0, 0, 15, -39, 34, -10},   // l1
+    {0, 0, 1, 0, -10, 20, -15, 4},    // m0
+    {0, 0, -2, 0, 25, -54, 43, -12},  // m1
+    {0, 0, 1, 0, -20, 48, -41, 12},   // m2
+    {1, 0, 0, 0, -35, 84, -70, 20},   // n1
 }};
 
 double power_sum(const std::array<double, 8>& c, double t) {
@@ -114,8 +114,7 @@ TEST_CASE("acr_basis: knot derivatives", "[kernels][spline][paper]") {
   }
 }
 
-TEST_CASE("acr_basis: straight lines at constant speed when kappa is a half",
-          "[kernels][spline]") {
+TEST_CASE("acr_basis: straight lines at constant speed when kappa is a half", "[kernels][spline]") {
   const Eigen::Vector4d line(-1.0, 0.0, 1.0, 2.0);
   for (const Sample& s : samples())
     REQUIRE(std::abs(acr_basis({0.5, s.shape.lambda}, s.t).dot(line) - s.t) < 1e-12);
@@ -157,8 +156,8 @@ TEST_CASE("acr_span: equals acr_basis times the points", "[kernels][spline]") {
     const std::array<double, 4> got = {v.value, v.d1, v.d2, v.d3};
     for (int order = 0; order <= 3; ++order) {
       const double expected = acr_basis(s.shape, s.t, order).dot(p);
-      worst = std::max(worst, std::abs(got[static_cast<std::size_t>(order)] - expected) /
-                                  std::pow(10.0, order));
+      worst = std::max(
+          worst, std::abs(got[static_cast<std::size_t>(order)] - expected) / std::pow(10.0, order));
     }
   }
   CHECK(worst < 1e-10);

@@ -81,9 +81,9 @@ TEST_CASE("acr_spline: invariant under rigid motion", "[kernels][spline]") {
     const double x = 2.5 + 0.14 * points.value();
     REQUIRE((acr_spline(moved, {0.5, 0.5}, x) - motion * acr_spline(p, {0.5, 0.5}, x)).norm() <
             1e-12);
-    REQUIRE((acr_spline(moved, {0.5, 0.5}, x, 2) -
-             motion.linear() * acr_spline(p, {0.5, 0.5}, x, 2))
-                .norm() < 1e-10);
+    REQUIRE(
+        (acr_spline(moved, {0.5, 0.5}, x, 2) - motion.linear() * acr_spline(p, {0.5, 0.5}, x, 2))
+            .norm() < 1e-10);
   }
 }
 
