@@ -11,6 +11,7 @@
 #include "postproc/pipeline/conversion_parts.h"
 #include "postproc/pipeline/joint_plan.h"
 #include "postproc/pipeline/machine_program.h"
+#include "postproc/pipeline/recipe_check.h"
 #include "postproc/pipeline/registry.h"
 #include "postproc/pipeline/rewind.h"
 
@@ -113,20 +114,7 @@ class Converter {
                        [](const PathPoint& p) { return p.beam; });
   }
 
-  // Settings that name what this version does not do are refused, never ignored.
   bool recipe_is_possible() {
-    const auto& r = in_.machine.recipe;
-    const auto refuse = [this](const std::string& key, const std::string& value,
-                               const char* possible) {
-      out_.diagnostics.push_back(diagnostic(
-          "US120",
-          key + " = \"" + value + "\" is not possible in this version; possible: " + possible));
-    };
-    if (r.orientation != "programmed") refuse("recipe.orientation", r.orientation, "programmed");
-    if (r.optimise != "none") refuse("recipe.optimise", r.optimise, "none");
-    if (r.schedule != "programmed") refuse("recipe.schedule", r.schedule, "programmed");
-    if (in_.machine.tolerance.lead != 0.0 || in_.machine.tolerance.tilt != 0.0)
-      refuse("tolerance.lead_deg and tilt_deg", "free", "0 (the programmed tool axis is kept)");
     dialect_ = find_dialect(in_.machine.dialect.name);
     if (!dialect_) {
       out_.diagnostics.push_back(
@@ -134,34 +122,9 @@ class Converter {
                                   "\" in this version: `smoothpost formats` lists them"));
       return false;
     }
-    if (in_.machine.dialect.mode == "tcp") turn_ = dialect_->tool_turn;
-    if (in_.machine.dialect.mode == "joint" && !dialect_->joints_linear)
-      refuse("dialect.mode", "joint",
-             "tcp (between the ends of its joint moves nothing is known of this controller)");
-    if (in_.machine.dialect.mode == "tcp" && turn_ == ToolTurn::none)
-      refuse("dialect.mode", "tcp", "joint (this dialect has no tool-centre-point mode)");
-    if (in_.machine.dialect.path_mode != "exact" && turn_ != ToolTurn::slerp)
-      refuse("dialect.path_mode", in_.machine.dialect.path_mode,
-             "exact (the rounding of this control has no bound that is known)");
-    smoothing_is_possible(refuse);
+    turn_ = tool_turn_of(in_.machine, *dialect_);
+    append(out_.diagnostics, recipe_problems(in_.machine, *dialect_, in_.input.path));
     return !has_error(out_.diagnostics);
-  }
-
-  template <class Refuse>
-  void smoothing_is_possible(const Refuse& refuse) {
-    const auto& r = in_.machine.recipe;
-    const auto& budget = in_.machine.tolerance.budget;
-    if (r.smoothing != "none" && budget.smoothing <= 0.0)
-      refuse("tolerance.budget.smoothing", "0", "a share above 0 when recipe.smoothing is on");
-    if (r.kappa < 0.4 || r.kappa > 0.6 || r.lambda < -0.5 || r.lambda > 2.5)
-      refuse("recipe.kappa and lambda", number(r.kappa) + ", " + number(r.lambda),
-             "0.4 to 0.6 and -0.5 to 2.5 (beyond, the curve runs backwards)");
-    if (r.task == "pose" && !in_.input.path.full_pose)
-      refuse("recipe.task", "pose",
-             "axis (this input gives tool axes only; CSV with qw,qx,qy,qz or rz,ry,rx has whole "
-             "rotations)");
-    if (r.task == "pose" && in_.machine.recipe.kind != "robot")
-      refuse("recipe.task", "pose", "axis (five axes cannot set the rotation about the tool)");
   }
 
   SmoothedPath smoothed() const {
@@ -280,6 +243,9 @@ class Converter {
     append(out_.diagnostics, planned.diagnostics());
     watch_.lap("kinematics");
     if (!planned.ok()) return false;
+    out_.corners = smoothed_->corners();
+    out_.merged_points = smoothed_->merged_points();
+    watch_.lap("corners");
     tell_posture(planned.value());
     BuiltProgram built =
         build_program({reference_, cuts_, in_.machine, chain_, part_box(), turn_, &*inverse_},
@@ -331,14 +297,11 @@ class Converter {
   }
 
   Result<JointPlan> plan_with(const JointPlanSettings& settings) {
-    const SmoothedPath path = smoothed();
+    smoothed_.emplace(smoothed());
     watch_.lap("smooth");
-    out_.corners = path.corners();
-    out_.merged_points = path.merged_points();
-    watch_.lap("corners");
     if (const RotaryPair* pair = inverse_->rotary_pair())
-      return plan_joints(path, *pair, settings, progress_);
-    return plan_arm(path, *inverse_->six_r(), settings, progress_);
+      return plan_joints(*smoothed_, *pair, settings, progress_);
+    return plan_arm(*smoothed_, *inverse_->six_r(), settings, progress_);
   }
 
   void split(const std::vector<SplitPlace>& places) {
@@ -573,6 +536,7 @@ class Converter {
   MachineProgram program_;
   std::vector<std::map<std::string, std::string>> wanted_states_;
   std::vector<std::uint32_t> split_lines_;
+  std::optional<SmoothedPath> smoothed_;
   std::optional<PartCheck> part_;
   std::optional<Inverse> inverse_;
   const Dialect* dialect_ = nullptr;

@@ -441,7 +441,7 @@ TEST_CASE("blending: a program with a latency is certified in every path mode", 
     in.input_name = "part.ngc";
     in.machine = robot(mode);
     for (auto& row : in.machine.process.events) row.latency = row.on_the_fly ? 0.0123 : 0.0;
-    in.placement = shifted(0, 0, 0);
+    in.machine.recipe.smoothing = "none";
     const Conversion c = convert(in, false, {});
     for (const auto& d : c.diagnostics) UNSCOPED_INFO(to_string(d));
     INFO(mode << "\n" << c.program);
