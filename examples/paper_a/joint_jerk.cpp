@@ -49,9 +49,9 @@ double peak_joint_jerk(const SixR& arm, std::span<const Pose> poses, double dt,
   }
   double most = 0.0;
   for (std::size_t k = 3; k < q.size(); ++k)
-    most = std::max(most, (q[k] - 3.0 * q[k - 1] + 3.0 * q[k - 2] - q[k - 3])
-                                  .lpNorm<Eigen::Infinity>() /
-                              (dt * dt * dt));
+    most = std::max(most,
+                    (q[k] - 3.0 * q[k - 1] + 3.0 * q[k - 2] - q[k - 3]).lpNorm<Eigen::Infinity>() /
+                        (dt * dt * dt));
   return most;
 }
 

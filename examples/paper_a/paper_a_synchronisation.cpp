@@ -22,8 +22,8 @@ using Rates = std::vector<std::array<double, 2>>;
 
 struct Method {
   std::string name;
-  std::vector<Piece> pieces;          ///< of the paper's methods
-  std::vector<CornerPath> blended;    ///< one, of ours
+  std::vector<Piece> pieces;        ///< of the paper's methods
+  std::vector<CornerPath> blended;  ///< one, of ours
   SynchronisationErrors errors() const {
     return blended.empty() ? synchronisation(pieces) : synchronisation(blended[0]);
   }

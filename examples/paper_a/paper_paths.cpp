@@ -44,8 +44,8 @@ Piece septic_link(const Six& from, const Six& to, const Vec3& a, const Vec3& b) 
   for (Eigen::Index c = 0; c < 3; ++c) {
     const double start = from[c + 3];
     const double end = to[c + 3];
-    piece.col(c + 3) =
-        acr_span({1.0, 0.0}, Eigen::Vector4d(end - length * a[c], start, end, start + length * b[c]));
+    piece.col(c + 3) = acr_span(
+        {1.0, 0.0}, Eigen::Vector4d(end - length * a[c], start, end, start + length * b[c]));
   }
   return piece;
 }
@@ -191,8 +191,8 @@ CornerPath common_parameter(const Tolerances& tolerances, BlendKind kind) {
     nodes.push_back({kTips[i], Eigen::Quaterniond(rotation_from_rpy(kAngles[i].z(), kAngles[i].y(),
                                                                     kAngles[i].x()))});
   for (std::size_t i = 0; i + 1 < nodes.size(); ++i)
-    legs.push_back({rotation_log(
-        (nodes[i].rotation.inverse() * nodes[i + 1].rotation).toRotationMatrix())});
+    legs.push_back(
+        {rotation_log((nodes[i].rotation.inverse() * nodes[i + 1].rotation).toRotationMatrix())});
   CornerSettings settings;
   settings.kind = kind;
   settings.tip_tolerance = tolerances.tip;
@@ -224,7 +224,8 @@ std::vector<Pose> sample(const CornerPath& path, double step) {
   for (std::size_t leg = 0; leg < path.legs(); ++leg) {
     const auto breaks = path.breaks(leg);
     for (std::size_t k = 0; k + 1 < breaks.size(); ++k) {
-      // Fixed steps of Runge and Kutta for dσ/ds = 1/|r'| would do; Simpson's table is exact enough.
+      // Fixed steps of Runge and Kutta for dσ/ds = 1/|r'| would do; Simpson's table is exact
+      // enough.
       constexpr int kCells = 64;
       const double cell = (breaks[k + 1] - breaks[k]) / kCells;
       for (int i = 0; i < kCells; ++i) {
@@ -269,8 +270,7 @@ SynchronisationErrors synchronisation(const CornerPath& path) {
     const auto right = quaternion_by_arc_length(b);
     const double sign = left[0].dot(right[0]) < 0.0 ? -1.0 : 1.0;
     for (std::size_t k = 0; k < 3; ++k)
-      e.at_junctions[k] =
-          std::max(e.at_junctions[k], (left[k + 1] - sign * right[k + 1]).norm());
+      e.at_junctions[k] = std::max(e.at_junctions[k], (left[k + 1] - sign * right[k + 1]).norm());
   };
   for (std::size_t leg = 0; leg < path.legs(); ++leg) {
     const auto b = path.breaks(leg);
@@ -295,8 +295,8 @@ std::vector<std::array<double, 2>> rates(const std::vector<Piece>& path) {
   double s = 0.0;
   for (const Piece& piece : path) {
     for (int j = 0; j <= 20; ++j)
-      out.push_back({s + length_of(piece, j / 20.0),
-                     by_arc_length(piece, j / 20.0)[1].tail<3>().norm()});
+      out.push_back(
+          {s + length_of(piece, j / 20.0), by_arc_length(piece, j / 20.0)[1].tail<3>().norm()});
     s += length_of(piece, 1.0);
   }
   return out;

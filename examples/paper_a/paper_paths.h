@@ -27,7 +27,7 @@ ArcDerivatives by_arc_length(const Piece& piece, double t);
 
 /// What stands between two corners of the paper.
 enum class Links : std::uint8_t {
-  literal,    ///< §4: control points U0 … U7 with κ = λ = 0, so angles linear in s on five stretches
+  literal,  ///< §4: control points U0 … U7 with κ = λ = 0, so angles linear in s on five stretches
   decoupled,  ///< tip and angles each on their line at constant rate
   septic      ///< a septic polynomial of s with the corners' rates at its ends
 };

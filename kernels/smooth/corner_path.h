@@ -113,6 +113,7 @@ class CornerPath {
   /// Extent of leg `leg` in σ, mm.   @pre leg < legs()
   double length(std::size_t leg) const { return lengths_[leg]; }
   bool tip_moves(std::size_t leg) const { return tip_moves_[leg]; }
+  const Vec3& turn(std::size_t leg) const { return legs_[leg].turn; }
 
   /// The smoothed pose at x ∈ [0, length(leg)] behind the start of leg `leg`.
   Pose at(std::size_t leg, double x) const;

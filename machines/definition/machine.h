@@ -100,7 +100,7 @@ struct ToleranceSettings {
 struct RecipeSettings {
   std::string kind = "five_axis";  ///< robot | laser | finishing | five_axis
   std::string smoothing = "none";
-  std::string shape = "half";  ///< of acr: half (kappa, lambda below) | paper (Eq. (37) per corner)
+  std::string shape = "half";  ///< half (kappa, lambda below) | paper (Eq. (37)) | tuned
   double kappa = 0.5;
   double lambda = 0.5;
   std::optional<double> ramp_c1;  ///< of ramp; nothing: by the turning angle

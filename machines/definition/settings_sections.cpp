@@ -265,7 +265,7 @@ RecipeSettings read_recipe(TableReader reader) {
   };
   choose("kind", {"robot", "laser", "finishing", "five_axis"}, recipe.kind);
   choose("smoothing", {"acr", "ramp", "none"}, recipe.smoothing);
-  choose("shape", {"half", "paper"}, recipe.shape);
+  choose("shape", {"half", "paper", "tuned"}, recipe.shape);
   choose("orientation", {"programmed", "qi", "qi_c2", "via", "cone", "graph", "monotone"},
          recipe.orientation);
   choose("optimise", {"jerk", "none"}, recipe.optimise);

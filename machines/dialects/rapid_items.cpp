@@ -67,7 +67,8 @@ std::vector<Item> items_at(const MachineDefinition& machine, const MachineProgra
   std::vector<Item> items;
   bool by_motion = place.before < program.moves.size() &&
                    program.moves[place.before].interpolation == MoveInterpolation::tool;
-  bool stands = place.before == 0;
+  bool stands = place.before == 0 ||
+                program.moves[place.before - 1].interpolation == MoveInterpolation::joints;
   std::size_t triggers = 0;
   for (std::size_t k = place.last; k-- > place.first;) {
     const auto& action = program.actions[k];

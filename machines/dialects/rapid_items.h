@@ -19,7 +19,8 @@ struct Item {
 /// What stands in front of each move, and behind the last. An event on the fly becomes a trigger
 /// when its text is a signal, a tool move follows, no statement stands behind it in the same place,
 /// and there are less than eight; else a statement. Errors: PR201 and those of event_text().
-/// Warning PR222: an event on the fly for which the robot stops.   Cost: linear.
+/// Warning PR222: an event on the fly for which the robot stops; it stands behind a joint move.
+/// Cost: linear.
 std::vector<std::vector<Item>> items_of(const MachineDefinition& machine,
                                         const MachineProgram& program, Diagnostics& diagnostics);
 

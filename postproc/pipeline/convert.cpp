@@ -6,6 +6,7 @@
 #include <set>
 
 #include "kernels/core/units.h"
+#include "kernels/optimise/shape_tuning.h"
 #include "postproc/pipeline/arm_plan.h"
 #include "postproc/pipeline/controller_blending.h"
 #include "postproc/pipeline/conversion_parts.h"
@@ -127,9 +128,50 @@ class Converter {
     return !has_error(out_.diagnostics);
   }
 
-  SmoothedPath smoothed() const {
+  SmoothedPath smoothed() {
     const auto& r = in_.machine.recipe;
     if (r.smoothing == "none") return SmoothedPath(reference_);
+    SmoothingSettings s = smoothing_settings();
+    if (r.shape == "tuned") tune(s);
+    return SmoothedPath(reference_, cuts_, s);
+  }
+
+  // Once for a conversion: every round of splits has the same shape.
+  void tune(SmoothingSettings& s) {
+    if (!tuned_) {
+      const SmoothedPath untuned(reference_, cuts_, s);
+      if (untuned.runs().empty()) return;
+      TuningSettings settings;
+      settings.corners = corner_settings(s);
+      settings.jerk_limits = limits_of(in_.machine).jerk;
+      settings.start = home_of(in_.machine);
+      settings.tool_length = in_.input.path.points.back().tool_length;
+      tuned_ = tune_blend_shape(*inverse_, untuned.runs(), settings);
+      watch_.lap("tune");
+      tell_tuning(*tuned_);
+    }
+    s.shape = tuned_->after.acr;
+    s.ramp_c1 = tuned_->after.c1;
+  }
+
+  void tell_tuning(const TuningResult& t) {
+    const auto shape_text = [this](const BlendShape& shape) {
+      return in_.machine.recipe.smoothing == "acr"
+                 ? "kappa " + number(shape.acr.kappa) + ", lambda " + number(shape.acr.lambda)
+                 : "c1 " + number(shape.c1);
+    };
+    out_.diagnostics.push_back(diagnostic(
+        "KN133",
+        "shape of the corners tuned to the joints: " + shape_text(t.before) + " -> " +
+            shape_text(t.after) + ", peak joint jerk at constant feed " +
+            (t.peak_before > 0.0 ? number(100.0 * t.peak_after / t.peak_before) : "100") +
+            " % of before, on the " + std::to_string(t.corners) + " sharpest corners",
+        in_.input_name));
+    out_.diagnostics.back().severity = Severity::note;
+  }
+
+  SmoothingSettings smoothing_settings() const {
+    const auto& r = in_.machine.recipe;
     const auto& tolerance = in_.machine.tolerance;
     SmoothingSettings s;
     s.kind = r.smoothing == "acr" ? BlendKind::acr : BlendKind::ramp;
@@ -141,7 +183,7 @@ class Converter {
     s.corner_tip = tolerance.tip * tolerance.budget.smoothing;
     s.corner_axis = tolerance.axis * tolerance.budget.smoothing;
     s.whole_rotation = r.task == "pose";
-    return SmoothedPath(reference_, cuts_, s);
+    return s;
   }
 
   bool has_cuts() {
@@ -537,6 +579,7 @@ class Converter {
   std::vector<std::map<std::string, std::string>> wanted_states_;
   std::vector<std::uint32_t> split_lines_;
   std::optional<SmoothedPath> smoothed_;
+  std::optional<TuningResult> tuned_;
   std::optional<PartCheck> part_;
   std::optional<Inverse> inverse_;
   const Dialect* dialect_ = nullptr;

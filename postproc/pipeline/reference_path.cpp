@@ -181,6 +181,7 @@ PathPlace place_between(const ReferencePath& reference, const PathPlace& from, c
   }
   double length = 0.0;
   const auto part = [&](std::uint32_t k) {
+    if (k == 0) return 0.0;  // the first point
     const double first = k == from.segment ? from.s : 0.0;
     const double last = k == to.segment ? to.s : 1.0;
     return reference.length(k) * (last - first);

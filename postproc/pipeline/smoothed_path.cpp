@@ -39,6 +39,18 @@ SmoothedPath::SmoothedPath(const ReferencePath& reference) : reference_(referenc
   for (std::uint32_t k = 1; k <= reference.segments(); ++k) legs_.push_back({{k, 0.0}, {k, 1.0}});
 }
 
+CornerSettings corner_settings(const SmoothingSettings& from) {
+  CornerSettings settings;
+  settings.kind = from.kind;
+  settings.shape = from.shape;
+  settings.paper_shape = from.paper_shape;
+  settings.ramp_c1 = from.ramp_c1;
+  settings.tip_tolerance = from.corner_tip;
+  settings.rotation_tolerance = from.corner_axis;
+  if (!from.whole_rotation) settings.tool_axis = Vec3::UnitZ();
+  return settings;
+}
+
 /// Makes the legs of one path.
 class PathSmoother {
  public:
@@ -301,15 +313,7 @@ class PathSmoother {
                             static_cast<std::int32_t>(out_.runs_.size()),
                             static_cast<std::uint32_t>(legs.size() - 1)});
     }
-    CornerSettings settings;
-    settings.kind = settings_.kind;
-    settings.shape = settings_.shape;
-    settings.paper_shape = settings_.paper_shape;
-    settings.ramp_c1 = settings_.ramp_c1;
-    settings.tip_tolerance = settings_.corner_tip;
-    settings.rotation_tolerance = settings_.corner_axis;
-    if (!settings_.whole_rotation) settings.tool_axis = Vec3::UnitZ();
-    out_.runs_.emplace_back(std::move(nodes), std::move(legs), arcs_, settings);
+    out_.runs_.emplace_back(std::move(nodes), std::move(legs), arcs_, corner_settings(settings_));
   }
 
   SmoothedPath& out_;

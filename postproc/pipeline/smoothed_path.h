@@ -23,6 +23,9 @@ struct SmoothingSettings {
   bool whole_rotation = false;  ///< corner_axis is for the whole rotation (task = "pose")
 };
 
+/// The same for one CornerPath.
+CornerSettings corner_settings(const SmoothingSettings& settings);
+
 /// What smoothing did at one corner, measured against the input at equal path parameter.
 struct SmoothedCorner {
   std::uint32_t input_line = 0;
@@ -76,6 +79,7 @@ class SmoothedPath {
   /// Bounds of |d²/ds²| of tip and axis between two neighbouring breaks.
   SecondDerivativeBound second_derivative_bound(std::size_t leg, double from, double to) const;
 
+  const std::vector<CornerPath>& runs() const { return runs_; }
   std::uint32_t merged_points() const { return merged_points_; }
   /// Corners that were blended or that stop the tool, in path order. Measured on a dense grid of
   /// their windows, against ReferencePath.   Cost: about 10 µs a corner.

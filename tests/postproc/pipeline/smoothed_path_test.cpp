@@ -440,7 +440,7 @@ TEST_CASE("smoothed_path: blended corners are smooth over the parameter",
       const SmoothedPath smoothed(reference, cuts, settings);
       const auto& points = reference.path().points;
       for (const SmoothedCorner& corner : smoothed.corners()) {
-        if (corner.stop || corner.half_width < 1e-3) continue;
+        if (corner.stop || corner.half_width < 1e-3 || corner.turn < 1e-6) continue;
         std::size_t found = 0, point = 0;
         for (std::size_t k = 1; k + 1 < points.size(); ++k)
           if (points[k].line == corner.input_line) ++found, point = k;
@@ -470,15 +470,13 @@ TEST_CASE("smoothed_path: corners tell what an independent measurement finds",
           "[postproc][pipeline][smooth]") {
   Random dice(7);
   for (const BlendKind kind : {BlendKind::acr, BlendKind::ramp})
-    for (int round = 0; round < 20; ++round) {
+    for (int round = 0; round < 10; ++round) {
       PathMaker maker(Vec3(0, 0, 0));
       Vec3 p(0, 0, 0), axis = Vec3::UnitZ();
       for (int i = 0; i < 4; ++i) {
         p += Vec3(dice.between(20, 40), dice.between(-30, 30), dice.between(-30, 30));
         axis = (axis + 0.5 * dice.unit()).normalized();
-        const Vec3 before = i == 0 ? Vec3(0, 0, 0) : Vec3(p);
         maker.axis(axis).feed(p, 1.0);
-        (void)before;
       }
       ToolPath path = maker.take();
       for (std::size_t k = 1; k < path.points.size(); ++k)  // 20 mm/s
@@ -506,7 +504,7 @@ TEST_CASE("smoothed_path: corners tell what an independent measurement finds",
         CHECK(corner.rotation_half_width > 0.0);
         // On the legs' middle halves there is no other corner: legs are long.
         double tip = 0.0, angle = 0.0;
-        const int n = 20000;
+        const int n = 4000;
         for (int i = 0; i <= n; ++i) {
           const double s = static_cast<double>(i) / n;
           const std::size_t leg = s <= 0.5 ? k : k + 1;
@@ -553,7 +551,7 @@ TEST_CASE("smoothed_path: corners of whole rotations tell the whole angle",
     const SmoothedPath smoothed(reference, cuts, settings);
     const auto corners = smoothed.corners();
     REQUIRE(corners.size() == 1);
-    const Worst worst = deviation(smoothed, 4000);
+    const Worst worst = deviation(smoothed, 2000);
     CHECK(corners[0].rotation_deviation == Approx(worst.rotation).epsilon(0.01));
     CHECK(corners[0].axis_deviation == Approx(worst.axis).epsilon(0.03).margin(1e-9));
     CHECK(corners[0].rotation_deviation <= settings.corner_axis + 1e-9);
@@ -571,22 +569,33 @@ TEST_CASE("smoothed_path: arcs stay arcs", "[postproc][pipeline][smooth]") {
       const auto cuts = cuts_of(path);
       const ReferencePath reference(path, {});
       const SmoothedPath smoothed(reference, cuts, settings_of(kind));
-      REQUIRE(smoothed.legs() == 6);
-      for (const std::size_t leg : {2UL, 5UL}) {
+      std::size_t legs = 0;
+      REQUIRE(smoothed.legs() >= 6);
+      for (std::size_t leg = 1; leg <= smoothed.legs(); ++leg) {
+        const std::uint32_t segment = smoothed.place(leg, 1.0).segment;
+        if (segment != 2 && segment != 5) continue;
         const auto breaks = smoothed.breaks(leg);
         double from = 0.0, to = 0.0;
         for (std::size_t i = 1; i < breaks.size(); ++i)
           if (breaks[i] - breaks[i - 1] > to - from) from = breaks[i - 1], to = breaks[i];
         INFO("leg " << leg << " from " << from << " to " << to);
         CHECK(to - from > 0.8);
-        const ArcGeometry& arc = path.arcs[leg == 2 ? 0 : 1];
+        ++legs;
+        const ArcGeometry& arc = path.arcs[segment == 2 ? 0 : 1];
         for (int i = 0; i <= 100; ++i) {
           const double s = from + i / 100.0 * (to - from);
           Vec3 spoke = smoothed.at(leg, s).tip - arc.centre;
           spoke.z() = 0.0;
-          CHECK(spoke.norm() == Approx(leg == 2 ? 15.0 : 10.0).margin(1e-9));
-          CHECK((smoothed.at(leg, s).tip - reference.at(leg, s).tip).norm() < 1e-9);
+          CHECK(spoke.norm() == Approx(segment == 2 ? 15.0 : 10.0).margin(1e-9));
+          CHECK((smoothed.at(leg, s).tip - original(reference, smoothed.place(leg, s)).tip).norm() <
+                1e-9);
         }
+      }
+      CHECK(legs >= 2);
+      std::set<std::uint32_t> lines;  // each corner once: none inside of an arc
+      for (const auto& c : smoothed.corners()) {
+        CHECK(lines.insert(c.input_line).second);
+        CHECK(c.turn > 1e-6);
       }
     }
 }
@@ -782,8 +791,11 @@ TEST_CASE("reference_path: place_between shares the tip's length", "[postproc][p
       const double y = dice.between(x, std::min(total, x + 6.0));
       const PathPlace from = place_of(x), to = place_of(y);
       const double a = length_at(from), b = length_at(to);
-      CHECK(number(place_between(reference, from, to, 0.0)) == Approx(x).margin(1e-9));
-      CHECK(number(place_between(reference, from, to, 1.0)) == Approx(y).margin(1e-9));
+      // On a turn on the spot the tip's length says nothing.
+      if (reference.length(from.segment) > 0.0)
+        CHECK(number(place_between(reference, from, to, 0.0)) == Approx(x).margin(1e-9));
+      if (reference.length(to.segment) > 0.0)
+        CHECK(number(place_between(reference, from, to, 1.0)) == Approx(y).margin(1e-9));
       double last = x;
       for (int i = 1; i < 16; ++i) {
         const PathPlace p = place_between(reference, from, to, i / 16.0);
