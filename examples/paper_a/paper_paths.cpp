@@ -85,17 +85,23 @@ void add_literal_link(const Corner& before, const Corner& after, std::vector<Pie
   for (std::size_t k = 0; k + 1 < u.size(); ++k) path.push_back(straight(u[k], u[k + 1]));
 }
 
-double length_of(const Piece& piece, double t) {
-  constexpr std::array<double, 3> kNodes = {-0.774596669241483, 0.0, 0.774596669241483};
-  constexpr std::array<double, 3> kWeights = {5.0 / 9.0, 8.0 / 9.0, 5.0 / 9.0};
-  constexpr int kParts = 12;
+// Gauss' rule of three places.
+constexpr std::array<double, 3> kPlaces = {-0.774596669241483, 0.0, 0.774596669241483};
+constexpr std::array<double, 3> kWeights = {5.0 / 9.0, 8.0 / 9.0, 5.0 / 9.0};
+
+template <typename Speed>
+double integral_of(Speed speed, double from, double to, int parts) {
+  const double half = 0.5 * (to - from) / parts;
   double sum = 0.0;
-  const double half = 0.5 * t / kParts;
-  for (int part = 0; part < kParts; ++part)
+  for (int part = 0; part < parts; ++part)
     for (std::size_t i = 0; i < 3; ++i)
-      sum += half * kWeights[i] *
-             by_parameter(piece, half * (2.0 * part + 1.0 + kNodes[i]))[1].head<3>().norm();
+      sum += half * kWeights[i] * speed(from + half * (2.0 * part + 1.0 + kPlaces[i]));
   return sum;
+}
+
+double length_of(const Piece& piece, double from, double to, int parts) {
+  return integral_of([&](double t) { return by_parameter(piece, t)[1].head<3>().norm(); }, from, to,
+                     parts);
 }
 
 Pose pose_of(const Six& v) {
@@ -119,11 +125,7 @@ std::array<Eigen::Vector4d, 4> quaternion_by_arc_length(const PoseDerivatives& d
 }
 
 double length_of(const CornerPath& path, std::size_t leg, double from, double to) {
-  constexpr int kParts = 200;
-  double sum = 0.0;
-  for (int i = 0; i < kParts; ++i)  // midpoints of the speed; smooth inside
-    sum += path.derivatives(leg, from + (to - from) * (i + 0.5) / kParts).tip[1].norm();
-  return sum * (to - from) / kParts;
+  return integral_of([&](double x) { return path.derivatives(leg, x).tip[1].norm(); }, from, to, 2);
 }
 
 double curvature(const Vec3& d1, const Vec3& d2) {
@@ -205,15 +207,17 @@ std::vector<Pose> sample(const std::vector<Piece>& path, double step) {
   std::vector<Pose> poses;
   double next = 0.0;  // from the start of the piece
   for (const Piece& piece : path) {
-    const double length = length_of(piece, 1.0);
+    double left = length_of(piece, 0.0, 1.0, 24);
     double t = 0.0;
-    while (next < length) {
-      for (int i = 0; i < 6; ++i)
-        t += (next - length_of(piece, t)) / by_parameter(piece, t)[1].head<3>().norm();
+    while (next < left) {
+      const double from = t;
+      for (int i = 0; i < 4; ++i)
+        t += (next - length_of(piece, from, t, 2)) / by_parameter(piece, t)[1].head<3>().norm();
       poses.push_back(pose_of(by_parameter(piece, t)[0]));
-      next += step;
+      left -= next;
+      next = step;
     }
-    next -= length;
+    next -= left;
   }
   return poses;
 }
@@ -295,9 +299,9 @@ std::vector<std::array<double, 2>> rates(const std::vector<Piece>& path) {
   double s = 0.0;
   for (const Piece& piece : path) {
     for (int j = 0; j <= 20; ++j)
-      out.push_back(
-          {s + length_of(piece, j / 20.0), by_arc_length(piece, j / 20.0)[1].tail<3>().norm()});
-    s += length_of(piece, 1.0);
+      out.push_back({s + length_of(piece, 0.0, j / 20.0, 12),
+                     by_arc_length(piece, j / 20.0)[1].tail<3>().norm()});
+    s += length_of(piece, 0.0, 1.0, 12);
   }
   return out;
 }

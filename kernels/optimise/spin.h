@@ -35,8 +35,9 @@ struct SpinPoint {
 
 /// What a rotation does to the arm, over all points on the best branch.
 struct SpinMeasure {
-  double margin = -1.0;  ///< least share of a joint's half range, or of singular(), that is left;
-                         ///< below 0: so many shares of the points cannot be reached
+  double margin = -1.0;  ///< least share of a joint's half range (below 0 beyond it), or of
+                         ///< singular(), that is left; with points out of reach: the same or 0,
+                         ///< whichever is less, minus the share of the points that are lost
   double jerk = 0.0;     ///< rad/mm³, root mean square of the joints' third differences by length
 };
 

@@ -192,8 +192,8 @@ class Run {
     const auto wanted = read_place_options(options_);
     add(wanted.diagnostics());
     if (!wanted.ok()) return {};
-    PlaceInput search{in.input, in.machine, in.placement, {}, wanted.value().box,
-                      wanted.value().turn};
+    PlaceInput search{in.input, in.machine,         in.placement,
+                      {},       wanted.value().box, wanted.value().turn};
     search.links = {in.keep_links, in.machine.links.micro_joint, in.cuts};
     const auto places = find_places(search, progress_);
     for (auto d : places.diagnostics()) {
@@ -397,13 +397,26 @@ class Run {
     return chain;
   }
 
+  // Comments of some controls end at 120 characters.
+  static void add_wrapped(std::string text, std::vector<std::string>& lines) {
+    constexpr std::size_t kLongest = 118;
+    while (text.size() > kLongest) {
+      const std::size_t blank = text.rfind(' ', kLongest);
+      if (blank == std::string::npos || blank == 0) break;
+      lines.push_back(text.substr(0, blank));
+      text.erase(0, blank + 1);
+    }
+    lines.push_back(std::move(text));
+  }
+
   std::vector<std::string> title(const ConvertInput& in) const {
     std::vector<std::string> lines;
     lines.push_back(std::string("smoothpost ") + kVersion + " for machine " +
                     machine_.definition.name);
     lines.push_back("input " + base_name(input_name_) + " sha256 " + context_.input_sha256);
     const bool by_tool = machine_.definition.dialect.mode == "tcp";
-    lines.push_back((by_tool ? "tool tip in the part. " : "machine joints. ") + in.placement_text);
+    add_wrapped((by_tool ? "tool tip in the part. " : "machine joints. ") + in.placement_text,
+                lines);
     std::map<int, double> tools;
     for (const auto& p : in.input.path.points)
       if (p.tool > 0) tools[p.tool] = p.tool_length;
@@ -516,9 +529,9 @@ JobResult dispatch(const Options& options, const Progress& progress) {
   if (options.command == "golden") return run_golden_command(options, progress);
   JobResult result;
   result.status = ExitStatus::usage;
-  result.diagnostics.push_back(usage_error(
-      "US100",
-      "unknown command \"" + options.command + "\": convert, check, place, machines, formats or golden"));
+  result.diagnostics.push_back(
+      usage_error("US100", "unknown command \"" + options.command +
+                               "\": convert, check, place, machines, formats or golden"));
   return result;
 }
 

@@ -2,9 +2,11 @@
 #include <cmath>
 
 #include "kernels/core/units.h"
+#include "postproc/pipeline/controller_blending.h"
 #include "postproc/pipeline/conversion_parts.h"
 #include "postproc/pipeline/path_match.h"
 #include "postproc/pipeline/registry.h"
+#include "postproc/pipeline/tool_motion.h"
 
 namespace smoothpost {
 
@@ -46,8 +48,14 @@ Checks shape_checks(const CheckInput& in, const FollowedProgram& program, const 
   match.reason =
       "the blocks are too long for this axis tolerance: what the control does between "
       "their ends is not known so closely";
-  if (tip > 0.0 && axis > 0.0)
-    match = match_paths(read, chain, reference, {tip, axis, beam}, progress);
+  PathMatchSettings settings{tip, axis};
+  settings.beam = beam;
+  const bool whole = in.machine.recipe.task == "pose";
+  if (whole) settings.whole_rotation = input_tool_rotation(chain.tool_axis, in.machine.recipe.spin);
+  if (whole && !path.full_pose)
+    match.reason = "recipe.task = \"pose\" needs an input with whole rotations";
+  else if (tip > 0.0 && axis > 0.0)
+    match = match_paths(read, chain, reference, settings, progress);
   const auto check = [&](const char* name, double limit, double allowance, const char* unit) {
     Check c;
     c.name = name;
@@ -60,9 +68,10 @@ Checks shape_checks(const CheckInput& in, const FollowedProgram& program, const 
     c.note = match.reason;
     return c;
   };
-  return {check("tip_deviation", tolerance.tip, program.tip_allowance, "mm"),
-          check("axis_deviation", degrees_from_radians(tolerance.axis),
-                degrees_from_radians(program.axis_allowance), "deg")};
+  return {
+      check("tip_deviation", tolerance.tip, program.tip_allowance, "mm"),
+      check(whole ? "rotation_deviation" : "axis_deviation", degrees_from_radians(tolerance.axis),
+            degrees_from_radians(program.axis_allowance), "deg")};
 }
 
 /// Joints of tool moves; the tool's length is the one that the program's own tool frame has, or the
@@ -98,6 +107,17 @@ bool follow_program(const CheckInput& in, const ScrewChain& chain, const Dialect
   program.tip_allowance = kStepShare * in.machine.tolerance.tip;
   program.axis_allowance = kStepShare * in.machine.tolerance.axis +
                            largest_turn_allowance(motion.read, chain, dialect.tool_turn);
+  // A rounding is paired with the straight way monotonically: its bound adds to the matching's.
+  BlendAllowance rounding;
+  for (const BlendAllowance& a : blend_allowances(motion.read, chain, tool_length)) {
+    rounding.tip = std::max(rounding.tip, a.tip);
+    rounding.rotation = std::max(rounding.rotation, a.rotation);
+  }
+  program.tip_allowance += rounding.tip;
+  program.axis_allowance += rounding.rotation;
+  if (rounding.tip > 0.0)
+    out.assumes.push_back(
+        blending_assumption(in.machine.dialect.path_mode == "spline" ? "spline" : "blend"));
   read = motion.steps ? std::move(*motion.steps) : std::move(motion.read);
   return true;
 }

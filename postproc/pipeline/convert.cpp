@@ -452,8 +452,12 @@ class Converter {
     ControllerMotion motion = std::move(followed.value());
     Verification machine = verify_machine(motion.joints(), in_.machine);
     DeviationInput with{reference_, out_.line_map, program_, chain_, turn_, part_box()};
-    if (in_.machine.dialect.path_mode != "exact")
+    if (turn_ == ToolTurn::slerp) {
       with.rounding = blend_allowances(motion.read, chain_, tool_length);
+      const auto rounds = [](const BlendAllowance& a) { return a.tip > 0.0 || a.rotation > 0.0; };
+      if (std::any_of(with.rounding.begin(), with.rounding.end(), rounds))
+        out_.assumes.push_back(blending_assumption(in_.machine.dialect.path_mode));
+    }
     if (in_.machine.recipe.task == "pose")
       with.whole_rotation = input_tool_rotation(chain_.tool_axis, in_.machine.recipe.spin);
     const Checks deviation = verify_deviation(motion.read, in_.machine, with, progress_);

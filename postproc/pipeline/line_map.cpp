@@ -10,8 +10,8 @@ LineMap line_map_of(const MachineProgram& program, const EmittedProgram& emitted
   map.reserve(program.moves.size());
   for (std::size_t i = 0; i < program.moves.size(); ++i) {
     const MachineMove& m = program.moves[i];
-    map.push_back(
-        {emitted.move_lines[i], m.input_line, m.role, m.segment, m.from_segment, m.from_share, m.to_share});
+    map.push_back({emitted.move_lines[i], m.input_line, m.role, m.segment, m.from_segment,
+                   m.from_share, m.to_share});
   }
   return map;
 }

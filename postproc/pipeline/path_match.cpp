@@ -18,15 +18,20 @@ constexpr double kNever = std::numeric_limits<double>::infinity();
 struct Sample {
   CutterLocation location;
   std::uint32_t line = 0;
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // of whole rotations
 };
 
 /// Distances in shares of the tolerances.
 class Metric {
  public:
-  explicit Metric(const PathMatchSettings& s) : tip_(s.tip_tolerance), axis_(s.axis_tolerance) {}
-  double between(const CutterLocation& a, const CutterLocation& b) const {
-    return std::max((a.tip - b.tip).norm() / tip_, angle_between(a.axis, b.axis) / axis_);
+  explicit Metric(const PathMatchSettings& s)
+      : tip_(s.tip_tolerance), axis_(s.axis_tolerance), whole_(s.whole_rotation) {}
+  double between(const Sample& a, const Sample& b) const {
+    const double turn = whole_ ? a.rotation.angularDistance(b.rotation)
+                               : angle_between(a.location.axis, b.location.axis);
+    return std::max((a.location.tip - b.location.tip).norm() / tip_, turn / axis_);
   }
+  const std::optional<Mat3>& whole() const { return whole_; }
   double bend(const SecondDerivativeBound& b) const {
     return std::max(b.tip / tip_, b.axis / axis_);
   }
@@ -42,7 +47,15 @@ class Metric {
  private:
   double tip_;
   double axis_;
+  std::optional<Mat3> whole_;
 };
+
+Sample input_sample(const ReferencePath& input, std::size_t segment, double s,
+                    const Metric& metric) {
+  Sample sample{input.at(segment, s), input.path().points[segment].line};
+  if (metric.whole()) sample.rotation = input.rotation_at(segment, s);
+  return sample;
+}
 
 /// The program's moves as samples, one after the other, without keeping them.
 class ProgramSamples {
@@ -60,30 +73,44 @@ class ProgramSamples {
 
   /// The tip and axis at the end of move i, with a tool of that length.
   Sample at_end(std::size_t i, double tool_length) const {
-    return {tip(program_.moves[i].to, tool_length), program_.moves[i].line};
+    return sample(program_.moves[i].to, tool_length, program_.moves[i].line);
   }
 
   /// Samples of move i after its start.
   std::vector<Sample> of_move(std::size_t i, double tool_length) const {
     const JointVector& from = program_.moves[i - 1].to;
     const JointVector& to = program_.moves[i].to;
-    const auto bound = second_derivative_bound(chain_, from, to);
+    auto bound = second_derivative_bound(chain_, from, to);
+    if (metric_.whole()) bound.axis = std::max(bound.axis, turning(from, to));
     const double bend = metric_.bend({bound.tip + tool_length * bound.axis, bound.axis});
     // Length ≤ chord + what the bend allows on either side of it.
-    const double chord = metric_.between(tip(from, tool_length), tip(to, tool_length));
+    const double chord = metric_.between(sample(from, tool_length, 0), sample(to, tool_length, 0));
     const int n = metric_.steps(chord + bend, bend);
     std::vector<Sample> samples;
     samples.reserve(static_cast<std::size_t>(n));
     for (int k = 1; k <= n; ++k)
-      samples.push_back({tip(from + static_cast<double>(k) / n * (to - from), tool_length),
-                         program_.moves[i].line});
+      samples.push_back(sample(from + static_cast<double>(k) / n * (to - from), tool_length,
+                               program_.moves[i].line));
     return samples;
   }
 
  private:
-  CutterLocation tip(const JointVector& q, double tool_length) const {
-    const CutterLocation holder = forward_location(chain_, q);
-    return {holder.tip - tool_length * holder.axis, holder.axis};
+  Sample sample(const JointVector& q, double tool_length, std::uint32_t line) const {
+    const Pose holder = forward(chain_, q);
+    const Vec3 axis = holder.linear() * chain_.tool_axis;
+    Sample out{{holder.translation() - tool_length * axis, axis}, line};
+    if (metric_.whole())
+      out.rotation = Eigen::Quaterniond(Mat3(holder.linear() * *metric_.whole()));
+    return out;
+  }
+
+  // (Σ|Δq|)² over the rotaries: the rotation's own curve stays as near its chord as with that bend.
+  double turning(const JointVector& from, const JointVector& to) const {
+    double sum = 0.0;
+    for (std::size_t j = 0; j < chain_.joints.size(); ++j)
+      if (chain_.joints[j].kind == JointKind::rotary)
+        sum += std::abs(to[static_cast<Eigen::Index>(j)] - from[static_cast<Eigen::Index>(j)]);
+    return sum * sum;
   }
 
   const ReadBack& program_;
@@ -96,12 +123,15 @@ std::vector<Sample> input_samples(const ReferencePath& input, std::size_t first,
                                   const Metric& metric) {
   const auto& points = input.path().points;
   std::vector<Sample> samples;
-  samples.push_back({points[first].location, points[first].line});
+  samples.push_back({points[first].location, points[first].line, points[first].rotation});
   for (std::size_t k = first + 1; k <= last; ++k) {
     const double bend = metric.bend(input.second_derivative_bound(k));
-    const int n = metric.steps(metric.between(input.at(k, 0.0), input.at(k, 1.0)) + bend, bend);
+    const int n = metric.steps(
+        metric.between(input_sample(input, k, 0.0, metric), input_sample(input, k, 1.0, metric)) +
+            bend,
+        bend);
     for (int i = 1; i <= n; ++i)
-      samples.push_back({input.at(k, static_cast<double>(i) / n), points[k].line});
+      samples.push_back(input_sample(input, k, static_cast<double>(i) / n, metric));
   }
   return samples;
 }
@@ -125,7 +155,7 @@ class Stretch {
       if (j == 0 && may_start) best = 0.0;
       double v = kNever;
       if (best < kNever) {
-        const double d = metric_.between(sample.location, input_[j].location);
+        const double d = metric_.between(sample, input_[j]);
         if (d <= 1.0 - kAllowance) v = std::max(best, d);
       }
       left = v;

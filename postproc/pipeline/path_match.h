@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "kernels/core/progress.h"
@@ -12,7 +13,9 @@ namespace smoothpost {
 struct PathMatchSettings {
   double tip_tolerance = 0.0;   ///< mm
   double axis_tolerance = 0.0;  ///< rad
-  bool beam = false;            ///< cuts have the beam on: feeds without it are links too
+  /// As DeviationInput::whole_rotation; given: axis_tolerance is for whole rotations.
+  std::optional<Mat3> whole_rotation = {};
+  bool beam = false;  ///< cuts have the beam on: feeds without it are links too
 };
 
 /// Whether a program follows an input, without a line map.

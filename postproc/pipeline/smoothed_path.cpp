@@ -84,7 +84,7 @@ class PathSmoother {
     PathPlace place;
     CutterLocation location;
     Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
-    double length = 0.0;  ///< from the cut's start, mm, turns counted too
+    double length = 0.0;  ///< way of the tip from the cut's start, mm
     bool exact = false;
     bool keep = false;
     std::int32_t arc = -1;
@@ -137,13 +137,14 @@ class PathSmoother {
   }
 
   void push(Node node, double length) {
-    const Node& last = nodes_.back();
-    const double turn = angle_between(last.location.axis, node.location.axis);
-    node.length = last.length + (length > kNoMotion ? length : millimetres_per_radian() * turn);
+    Node& last = nodes_.back();
+    node.length = last.length + length;
+    // A turn in place has no length to be paired by: it stays a leg of its own.
+    const bool turns = (last.location.axis - node.location.axis).norm() > kNoTurn ||
+                       last.rotation.angularDistance(node.rotation) > kNoTurn;
+    if (length < kNoMotion && turns) last.keep = node.keep = true;
     nodes_.push_back(std::move(node));
   }
-
-  double millimetres_per_radian() const { return settings_.corner_tip / settings_.corner_axis; }
 
   void add_segment(std::uint32_t k) {
     const PathPoint& to = path_.points[k];
@@ -400,6 +401,8 @@ std::vector<SmoothedCorner> SmoothedPath::corners() const {
     const CornerPath& run = runs_[r];
     for (std::size_t i = 1; i < run.legs(); ++i) {
       const Corner& c = run.corners()[i];
+      // Nodes inside a segment are ours: its parts go on as one curve.
+      if (legs_[first_leg_[r] + i - 1].to.s < 1.0) continue;
       if (c.half_width > 0.0 || c.rotation_half_width > 0.0 || c.stop)
         all.push_back(measure(run, first_leg_[r], i));
     }

@@ -29,8 +29,8 @@ CornerSettings corner_settings(const SmoothingSettings& settings);
 /// What smoothing did at one corner, measured against the input at equal path parameter.
 struct SmoothedCorner {
   std::uint32_t input_line = 0;
-  double turn = 0.0;  ///< rad
-  std::string method;
+  double turn = 0.0;                 ///< rad
+  std::string method;                ///< acr | ramp | stop
   AcrShape shape;                    ///< acr
   double c1 = 0.0;                   ///< ramp
   double half_width = 0.0;           ///< mm
@@ -46,9 +46,9 @@ struct SmoothedCorner {
 /// kept as arcs. Without settings it is the input's path itself.
 ///
 /// It consists of legs, counted from 1; leg 0 stands for the first point. A leg is one segment of
-/// the input, a part of one (a curve that is no line and no arc), or several whose points were
-/// merged. The share s ∈ [0, 1] of a leg is the parameter σ of CornerPath: at equal s a smoothed
-/// pose stands for the input's pose at place(leg, s).
+/// the input, a part of one (of a long arc, of a curve that is neither line nor arc), or several
+/// whose points were merged. The share s ∈ [0, 1] of a leg is the parameter σ of CornerPath: at
+/// equal s a smoothed pose stands for the input's pose at place(leg, s).
 ///
 /// Never blended and never merged: points with a process event or a dwell, where the tool or its
 /// length changes, the ends of cuts; never merged: where the feed changes. Segments outside of cuts
@@ -81,8 +81,8 @@ class SmoothedPath {
 
   const std::vector<CornerPath>& runs() const { return runs_; }
   std::uint32_t merged_points() const { return merged_points_; }
-  /// Corners that were blended or that stop the tool, in path order. Measured on a dense grid of
-  /// their windows, against ReferencePath.   Cost: about 10 µs a corner.
+  /// Points of the input that were blended or that stop the tool, in path order. Measured on a
+  /// dense grid of their windows, against ReferencePath.   Cost: about 10 µs a corner.
   std::vector<SmoothedCorner> corners() const;
 
  private:

@@ -47,8 +47,8 @@ struct DeviationInput {
   std::optional<PartBox> part = {};  ///< where low links are proven to pass it
   /// For each move of the text: how far the control itself rounds it (controller_blending).
   std::vector<BlendAllowance> rounding = {};
-  /// Rotation from the tool frame of the input to that of the chain; given: rotations are compared
-  /// whole (task = "pose").
+  /// R_chain,input = R_W,chain^T · R_W,input, constant (input_tool_rotation()); given: rotations
+  /// are compared whole (task = "pose").
   std::optional<Mat3> whole_rotation = {};
 };
 

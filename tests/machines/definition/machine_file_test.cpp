@@ -216,7 +216,9 @@ TEST_CASE("machine file: documented defaults", "[machines][definition]") {
   CHECK(m.tolerance.tip == 0.01);
   CHECK(m.tolerance.axis == Approx(0.05 * kPi / 180));
   CHECK(m.tolerance.limit_share == 1.0);
-  CHECK(m.tolerance.budget.chord == 0.15);
+  CHECK(m.tolerance.budget.chord == 0.65);  // without smoothing
+  CHECK(m.tolerance.budget.smoothing == 0.0);
+  CHECK(parse(base_and("[recipe]\nsmoothing = \"acr\"\n")).tolerance.budget.chord == 0.15);
   CHECK(m.recipe.kind == "five_axis");
   CHECK(m.recipe.smoothing == "none");
   CHECK(m.dialect.name == "linuxcnc");
@@ -412,14 +414,14 @@ TEST_CASE("machine file: values that are not in the list", "[machines][definitio
   refused("links", "rewind", "links_only");
   refused("recipe", "kind", "robot, laser, finishing or five_axis");
   refused("recipe", "smoothing", "acr, ramp or none");
-  refused("recipe", "shape", "half or paper");
+  refused("recipe", "shape", "half, paper or tuned");
   refused("recipe", "orientation", "monotone");
   refused("recipe", "optimise", "jerk or none");
   refused("recipe", "solver", "hybrid");
   refused("recipe", "schedule", "jerk, constant or programmed");
   refused("dialect", "mode", "joint or tcp");
   refused("dialect", "units", "mm or inch");
-  refused("dialect", "path_mode", "exact or blend");
+  refused("dialect", "path_mode", "exact, blend or spline");
   refused("process", "unmapped", "refuse or comment");
   check_value(base_and("[dialect]\nextension = \".ngc\"\n"), "MF113", "extension = \".ngc\"");
   check_value(base_and("[dialect]\nname = \"\"\n"), "MF113", "name = \"\"");

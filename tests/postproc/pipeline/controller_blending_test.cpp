@@ -5,8 +5,9 @@
 
 #include "kernels/core/units.h"
 #include "machines/dialects/krl.h"
+#include "postproc/pipeline/convert.h"
 #include "postproc/pipeline/tool_motion.h"
-#include "tests/support/machines.h"
+#include "tests/postproc/pipeline/paths.h"
 
 using namespace smoothpost;
 using namespace smoothpost::test;
@@ -420,4 +421,33 @@ TEST_CASE("blending: a move behind a joint move starts where the chain stands", 
   read.moves[0].tool = Pose::Identity();
   read.moves[1].blend = 2.0;
   CHECK(allowances(read, machine, 80.0)[1].tip == Approx(2.0 * std::sin(kPi / 4.0)));
+}
+
+TEST_CASE("blending: a program with a latency is certified in every path mode", "[pipeline]") {
+  // A wave with a corner and with the beam going on and off within it.
+  std::string text = "%\nM428\nG21 G90 G17 G94\nG54\nG0 X-60 Y0 Z60 C0 B0\nG0 Z1\n";
+  for (int i = 0; i <= 60; ++i) {
+    const double x = -60.0 + 2.0 * i,
+                 y = 12.0 * std::sin(0.1 * i) + (i > 30 ? 2.0 * (i - 30) : 0.0);
+    if (i == 10 || i == 40) text += "M62 P0\n";
+    if (i == 25 || i == 55) text += "M63 P0\n";
+    text += "G1 X" + std::to_string(x) + " Y" + std::to_string(y) + " Z1 C0 B" +
+            std::to_string(0.2 * i) + " F3000\n";
+  }
+  text += "G0 Z60\nM429\nM30\n%\n";
+  for (const std::string mode : {"exact", "blend", "spline"}) {
+    ConvertInput in;
+    in.input = read_program(text, "laser_5p1");
+    in.input_name = "part.ngc";
+    in.machine = robot(mode);
+    for (auto& row : in.machine.process.events) row.latency = row.on_the_fly ? 0.0083 : 0.0;
+    in.placement = shifted(0, 0, 0);
+    const Conversion c = convert(in, false, {});
+    for (const auto& d : c.diagnostics) UNSCOPED_INFO(to_string(d));
+    INFO(mode << "\n" << c.program);
+    CHECK(c.verdict == Verdict::certified);
+    CHECK((c.program.find(" C_DIS") != std::string::npos) == (mode == "blend"));
+    CHECK((c.program.find("ENDSPLINE") != std::string::npos) == (mode == "spline"));
+    CHECK((c.program.find(" DELAY=-8 DO ") != std::string::npos) == (mode != "spline"));
+  }
 }

@@ -83,8 +83,8 @@ TEST_CASE("changed_checks: verdicts, values, new and absent checks", "[postproc]
 
 TEST_CASE("line_map_json: one row a motion", "[postproc][report]") {
   const std::string text = line_map_json(
-      {{12, 3, MoveRole::path, 2, 0.25, 1.0}, {13, 0, MoveRole::link, 0, 0, 1}}, "a\"b");
-  CHECK(contains(text, "[12,3,\"path\",2,0.25,1]"));
-  CHECK(contains(text, "[13,0,\"link\",0,0,1]"));
+      {{12, 3, MoveRole::path, 4, 2, 0.25, 1.0}, {13, 0, MoveRole::link, 0, 0, 0, 1}}, "a\"b");
+  CHECK(contains(text, "[12,3,\"path\",4,0.25,1,2]"));
+  CHECK(contains(text, "[13,0,\"link\",0,0,1,0]"));
   CHECK(contains(text, "\"a\\\"b\""));
 }
