@@ -21,6 +21,7 @@ constexpr double kLinkSpeed = 0.25;         // m/s, of links whose tip goes stra
 constexpr double kLeastOrientation = 60.0;  // deg/s
 constexpr double kLeastTurnRate = 1e-3;     // deg/s: below it the move stands still
 constexpr double kNoLength = 1e-6;          // mm: a move that only turns
+constexpr int kLoadDigits = 4;              // of kg, mm and kg m^2
 constexpr double kMetresPerMillimetre = 1e-3;
 constexpr double kMillisecondsPerSecond = 1e3;
 constexpr int kPathDigits = 5;               // of PATH in a TRIGGER, mm
@@ -98,8 +99,22 @@ class Emitter {
     for (const auto& line : machine_.dialect.start) text_.line(line);
     text_.line("; speed of links on a straight line, m/s");
     text_.line("$ADVANCE=3");
+    load_words();
     modal_words();
     if (!program_.certified) text_.line("HALT");
+  }
+
+  // What hangs on the flange; without it in the machine file the control keeps its own.
+  void load_words() {
+    if (!machine_.tool.load) return;
+    const LoadData& load = *machine_.tool.load;
+    const auto axes = [](const Vec3& v, int digits) {
+      return "X " + decimal(v.x(), digits) + ",Y " + decimal(v.y(), digits) + ",Z " +
+             decimal(v.z(), digits);
+    };
+    text_.line("$LOAD.M=" + decimal(load.mass, kLoadDigits));
+    text_.line("$LOAD.CM={" + axes(load.centre, kLoadDigits) + ",A 0,B 0,C 0}");
+    text_.line("$LOAD.J={" + axes(load.inertia, kLoadDigits) + "}");
   }
 
   // Everything that motions rely on; printed again at each label.

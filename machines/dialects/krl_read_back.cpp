@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "formats/robot/krl_reader.h"
@@ -124,6 +125,7 @@ class Reading {
 
   bool read_variable(const Statement& s) {
     if (s.name == "$BASE" || s.name == "$TOOL") return read_frame(s), true;
+    if (s.name.rfind("$LOAD.", 0) == 0) return read_load(s);
     if (s.name == "$VEL.CP") {
       link_speed_ = packed(s.value) == "SP_LINK";
       cp_ = s.number.value_or(0.0);
@@ -162,6 +164,33 @@ class Reading {
         rotation_from_rpy(radians_from_degrees(value("C")), radians_from_degrees(value("B")),
                           radians_from_degrees(value("A")));
     return pose;
+  }
+
+  // A load other than the machine file's is another tool.
+  bool read_load(const Statement& s) {
+    const auto& load = machine_.tool.load;
+    if (!load || !result.moves.empty()) {
+      error(s, "NC324",
+            s.name + (load ? " changes behind a motion" : ": the machine file has no [tool.load]"));
+      return true;
+    }
+    constexpr double kPrinted = 1e-4;
+    bool same = false;
+    if (s.name == "$LOAD.M") {
+      same = s.number && std::abs(*s.number - load->mass) < kPrinted;
+    } else if (s.name == "$LOAD.CM" || s.name == "$LOAD.J") {
+      const Vec3& wanted = s.name == "$LOAD.CM" ? load->centre : load->inertia;
+      const std::array<const char*, 3> keys = {"X", "Y", "Z"};
+      same = true;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const auto value = s.aggregate.find(keys[i]);
+        same = same && value && std::abs(*value - wanted[static_cast<int>(i)]) < kPrinted;
+      }
+    } else {
+      return false;
+    }
+    if (!same) error(s, "NC324", s.name + " is not the load of machine " + machine_.name);
+    return true;
   }
 
   void read_frame(const Statement& s) {

@@ -338,8 +338,12 @@ TEST_CASE("krl: what could move differently than certified is refused", "[machin
   };
   read(machine, with("LIN {", "TRIGGER WHEN DISTANCE=1 DELAY=-5 DO $OUT[1]=TRUE\nLIN {"));
   const std::vector<std::string> bad = {
-      with("$BASE={", "; $BASE={"),                   // no base before LIN
-      with("$TOOL={X ", "$TOOL={X 9"),                // another tool
+      with("$BASE={", "; $BASE={"),     // no base before LIN
+      with("$TOOL={X ", "$TOOL={X 9"),  // another tool
+      with("$LOAD.M=", "$LOAD.M=9"),    // another load
+      with("$LOAD.CM={X ", "$LOAD.CM={X 9"),
+      with("$LOAD.J={X ", "$LOAD.J={Y "),
+      with("LIN {", "$LOAD.M=32\nLIN {"),             // behind a motion
       with("$IPO_MODE=#BASE", "$IPO_MODE=#TCP"),      // other frame
       with("$ORI_TYPE=#VAR", "$ORI_TYPE=#CONSTANT"),  // tool does not turn
       with("LIN {", "$BASE={X 0,Y 0,Z 0,A 0,B 0,C 0}\nLIN {"),
