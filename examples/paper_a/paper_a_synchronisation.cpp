@@ -51,14 +51,22 @@ void write_svg(const std::filesystem::path& file, const std::vector<Method>& all
   constexpr double kWidth = 720.0, kStrip = 90.0, kLeft = 10.0;
   std::ofstream out(file);
   out << "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"740\" height=\""
-      << kStrip * static_cast<double>(all.size()) + 20.0
+      << kStrip * static_cast<double>(all.size()) + 60.0
       << "\" font-family=\"sans-serif\" font-size=\"12\">\n";
-  double top = 10.0;
+  out << "<text x=\"10\" y=\"18\">rotation rate |dphi/ds| over the length s of the path, each from "
+         "0 to "
+         "its peak</text>\n";
+  double top = 30.0;
+  double length = 0.0;
   for (const Method& m : all) {
     const Rates r = m.rate();
     double most = 1e-12;
     for (const auto& point : r) most = std::max(most, point[1]);
-    out << "<text x=\"" << kLeft << "\" y=\"" << top + 12.0 << "\">" << m.name << "</text>\n"
+    length = r.back()[0];
+    std::array<char, 32> peak{};
+    std::snprintf(peak.data(), peak.size(), "%.4f", most);
+    out << "<text x=\"" << kLeft << "\" y=\"" << top + 12.0 << "\">" << m.name << ", peak "
+        << peak.data() << " rad/mm</text>\n"
         << "<polyline fill=\"none\" stroke=\"#1f4e9c\" points=\"";
     for (const auto& point : r) {
       std::array<char, 64> text{};
@@ -69,7 +77,11 @@ void write_svg(const std::filesystem::path& file, const std::vector<Method>& all
     out << "\"/>\n";
     top += kStrip;
   }
-  out << "</svg>\n";
+  std::array<char, 48> end{};
+  std::snprintf(end.data(), end.size(), "s = %.1f mm", length);
+  out << "<text x=\"" << kLeft << "\" y=\"" << top + 14.0 << "\">s = 0</text>\n"
+      << "<text x=\"730\" y=\"" << top + 14.0 << "\" text-anchor=\"end\">" << end.data()
+      << "</text>\n</svg>\n";
 }
 
 void write_csv(const std::filesystem::path& file, const std::vector<Method>& all) {
