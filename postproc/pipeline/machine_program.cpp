@@ -230,7 +230,7 @@ class Builder {
   // The fastest that each joint goes on a tool move, as the way that it would go at that rate.
   JointVector tool_travel(const JointVector& from, const MachineMove& move,
                           double tool_length) const {
-    constexpr int kSteps = 8;
+    constexpr int kSteps = 32;        // near a pole the joints turn unevenly
     constexpr double kBetween = 1.1;  // between the steps it may be a little faster
     const Pose start = tip_pose(in_.chain, from, tool_length);
     const Pose end = tip_pose(in_.chain, move.to, tool_length);
