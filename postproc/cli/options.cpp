@@ -35,9 +35,10 @@ void add_output_options(CLI::App* app, CommandLine& l) {
 void add_part_options(CLI::App* app, CommandLine& l) {
   app->add_option("-w,--workpiece", l.workpiece, "the part: an STL in the program's coordinates");
   app->add_option("--workpiece-unit", l.workpiece_unit, "unit of the STL: mm | inch");
-  app->add_option("--work-offset", l.work_offset,
-                  "G54=x,y,z[,a,b,c]: the program's zero on the output machine, mm and deg; convert: "
-                  "auto finds it")
+  app->add_option(
+         "--work-offset", l.work_offset,
+         "G54=x,y,z[,a,b,c]: the program's zero on the output machine, mm and deg; convert: "
+         "auto finds it")
       ->take_all()
       ->allow_extra_args(false);
 }
@@ -57,7 +58,8 @@ void add_input_options(CLI::App* app, CommandLine& l) {
                   "G54=x,y,z[,a,b,c]: the program's zero on the input machine")
       ->take_all()
       ->allow_extra_args(false);
-  app->add_option("--tool", l.tool, "N=length or NAME:N=length in mm, NAME as the input calls the tool; repeatable")
+  app->add_option("--tool", l.tool,
+                  "N=length or NAME:N=length in mm, NAME as the input calls the tool; repeatable")
       ->take_all()
       ->allow_extra_args(false);
   app->add_option("--tip-tolerance", l.tip_tolerance, "mm");
@@ -83,7 +85,7 @@ void add_convert(CLI::App& app, CommandLine& l) {
   add_input_options(c, l);
   c->add_option("--lead", l.lead, "freedom of the tool axis, deg");
   c->add_option("--tilt", l.tilt, "freedom of the tool axis, deg");
-  c->add_option("--smoothing", l.smoothing, "none");
+  c->add_option("--smoothing", l.smoothing, "acr | ramp | none");
   c->add_option("--orientation", l.orientation, "programmed");
   c->add_option("--optimise", l.optimise, "none");
   c->add_option("--schedule", l.schedule, "programmed");
@@ -116,6 +118,7 @@ void add_check(CLI::App& app, CommandLine& l) {
   auto* c = app.add_subcommand("check", "certify an existing machine program");
   c->add_option("program", l.input, "the program; - for standard input")->required();
   add_machine_options(c, l);
+  c->add_option("--dialect", l.dialect, "the program's dialect instead of the machine's");
   add_part_options(c, l);
   c->add_option("--against", l.against,
                 "the CAM program that it is to follow: certifies its shape too");
