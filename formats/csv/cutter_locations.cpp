@@ -301,9 +301,9 @@ class Reader {
       point.rotation = q;
     } else {
       const Vec3 angles{number(kRz), number(kRy), number(kRx)};
-      point.rotation = Eigen::Quaterniond(
-          rotation_from_rpy(radians_from_degrees(angles[2]), radians_from_degrees(angles[1]),
-                            radians_from_degrees(angles[0])));
+      point.rotation = Eigen::Quaterniond(rotation_from_rpy(radians_from_degrees(angles[2]),
+                                                            radians_from_degrees(angles[1]),
+                                                            radians_from_degrees(angles[0])));
     }
     point.location.axis = point.rotation.toRotationMatrix().col(2).normalized();
   }

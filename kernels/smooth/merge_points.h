@@ -10,11 +10,11 @@ namespace smoothpost {
 
 /// A point of a dense path.
 struct MergePoint {
-  Vec3 tip = Vec3::Zero();    ///< mm
-  Vec3 axis = Vec3::UnitZ();  ///< unit
+  Vec3 tip = Vec3::Zero();                                       ///< mm
+  Vec3 axis = Vec3::UnitZ();                                     ///< unit
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< with settings.whole_rotation
-  double length = 0.0;        ///< mm along the path from its start, not decreasing
-  bool keep = false;          ///< must stay: an event, a change of feed, the end of an arc
+  double length = 0.0;  ///< mm along the path from its start, not decreasing
+  bool keep = false;    ///< must stay: an event, a change of feed, the end of an arc
 };
 
 struct MergeSettings {

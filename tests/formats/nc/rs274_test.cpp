@@ -149,9 +149,10 @@ OracleRun run_oracle(const std::string& text) {
   static const OwnFolder folder;
   std::ofstream(folder.path() / "p.ngc", std::ios::binary) << text;
   std::ofstream(folder.path() / "v.var", std::ios::binary);
+  // rs274 maps its tool table from a file in HOME: two runs at once must not share it.
   const std::string command =
       "cd '" + folder.path().string() +
-      "' && rs274 -g -t tool.tbl -v v.var p.ngc >out.txt 2>err.txt </dev/null";
+      "' && HOME=\"$PWD\" rs274 -g -t tool.tbl -v v.var p.ngc >out.txt 2>err.txt </dev/null";
   OracleRun run;
   run.accepted = std::system(command.c_str()) == 0;
   CanonicalReader reader(run);

@@ -147,9 +147,10 @@ std::optional<std::vector<std::string>> canonical_lines(const std::string& text,
   std::ofstream(folder / "p.ngc", std::ios::binary) << text;
   std::ofstream(folder / "v.var", std::ios::binary);
   std::ofstream(folder / "tool.tbl") << "T1 P1 Z0 D0.1\nT2 P2 Z0 D0.1\n";
+  // rs274 maps its tool table from a file in HOME: two runs at once must not share it.
   const std::string command =
       "cd '" + folder.string() +
-      "' && rs274 -g -t tool.tbl -v v.var p.ngc >out.txt 2>err.txt </dev/null";
+      "' && HOME=\"$PWD\" rs274 -g -t tool.tbl -v v.var p.ngc >out.txt 2>err.txt </dev/null";
   if (std::system(command.c_str()) != 0) return {};
   std::vector<std::string> calls;
   std::ifstream out(folder / "out.txt");
