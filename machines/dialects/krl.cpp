@@ -9,6 +9,7 @@
 #include "machines/dialects/event_text.h"
 #include "machines/dialects/krl_line.h"
 #include "machines/dialects/krl_text.h"
+#include "machines/dialects/tool_frame.h"
 
 namespace smoothpost::krl {
 
@@ -383,12 +384,6 @@ class Emitter {
 };
 
 }  // namespace
-
-Pose tool_frame(const MachineDefinition& machine, double tool_length) {
-  Pose tool = Pose::Identity();
-  tool.translation() = machine.tool.tip - tool_length * machine.tool.axis;
-  return machine.tool.flange.inverse() * tool;
-}
 
 Result<EmittedProgram> emit(const MachineDefinition& machine, const MachineProgram& program) {
   return Emitter(machine, program).run();

@@ -4,10 +4,6 @@
 
 namespace smoothpost::krl {
 
-/// X_FT, the value of $TOOL: the flange of the machine file to the tip of a tool of `tool_length`
-/// mm. With every joint 0, T has the rotation of M.
-Pose tool_frame(const MachineDefinition& machine, double tool_length);
-
 /// Prints one .src file for KUKA KSS 8: PTP to joints for interpolation joints, LIN in $BASE for
 /// interpolation tool. $BASE is program.part, $TOOL is tool_frame(). Events on the fly are TRIGGERs
 /// at the start point of the motion behind them, unless the robot stands there anyway.

@@ -4,10 +4,6 @@
 
 namespace smoothpost::rapid {
 
-/// X_FT, the frame of the tooldata: the flange of the machine file to the tip of a tool of
-/// `tool_length` mm. With every joint 0, T has the rotation of M.
-Pose tool_frame(const MachineDefinition& machine, double tool_length);
-
 /// Prints one module for ABB RobotWare 6 and 7: MoveAbsJ to joints for interpolation joints, MoveL
 /// in the wobjdata (program.part) with the tooldata (tool_frame(), [tool.load]) for interpolation
 /// tool. Speed data are length over planned time, never faster by more than 2e-5. Events on the fly

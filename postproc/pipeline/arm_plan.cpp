@@ -397,6 +397,10 @@ class ArmPlanner {
       if ((pose.linear() * chain.tool_axis - wanted.axis).norm() + allowance >
           0.8 * settings_.axis_tolerance)
         return false;
+      if (!settings_.whole_rotation) continue;
+      const Mat3 rotation = path_.rotation_at(to.segment, from.s + t * (to.s - from.s));
+      const double angle = rotation_log(rotation.transpose() * pose.linear() * from_input_).norm();
+      if (angle + allowance > 0.8 * settings_.axis_tolerance) return false;
     }
     return true;
   }

@@ -325,10 +325,13 @@ class DeviationCheck {
       piece.t1 = length;
       pieces.push_back(piece);
     }
-    if (length <= 0.0) return {{e.segment, 0.0, e.to_share, 0.0, 1.0}};  // only the axis turns
-    for (Piece& piece : pieces) {
-      piece.t0 /= length;
-      piece.t1 /= length;
+    for (std::size_t k = 0; k < pieces.size(); ++k) {
+      // Where only the axis turns there is no length: each segment has as much of the block.
+      const bool none = length <= 0.0;
+      pieces[k].t0 = none ? static_cast<double>(k) / static_cast<double>(pieces.size())
+                          : pieces[k].t0 / length;
+      pieces[k].t1 = none ? static_cast<double>(k + 1) / static_cast<double>(pieces.size())
+                          : pieces[k].t1 / length;
     }
     return pieces;
   }
