@@ -90,6 +90,9 @@ struct ToleranceSettings {
   double axis = 0.0;  ///< rad
   double lead = 0.0;  ///< rad
   double tilt = 0.0;  ///< rad
+  /// mm, that a tilted beam may shift the cut's edge on the far side of the sheet; nothing: what
+  /// the tilt tolerance implies
+  std::optional<double> exit_edge;
   double clearance = 0.0;
   double event = 0.5;  ///< mm along the path that an event on the fly may be off its place
   double limit_share =
@@ -110,6 +113,9 @@ struct RecipeSettings {
   std::string solver = "hybrid";
   std::string schedule = "programmed";
   int knot_every = 4;
+  /// mm along each cut, ascending, of the via points of orientation "via"; empty: found from the
+  /// path
+  std::vector<double> via;
   std::string spin_policy = "fixed";  ///< arms, task axis: fixed | tangent | optimised
   std::optional<double> spin;         ///< rad, arms: rotation about the tool axis; nothing: chosen
 };

@@ -245,6 +245,7 @@ ToleranceSettings read_tolerance(TableReader reader, bool smooths) {
   tolerance.axis = radians_or(reader, "axis_deg", 0.05, Bound::positive);
   tolerance.lead = radians_or(reader, "lead_deg", 0.0, Bound::not_negative);
   tolerance.tilt = radians_or(reader, "tilt_deg", 0.0, Bound::not_negative);
+  tolerance.exit_edge = reader.number("exit_edge_mm", Bound::positive);
   tolerance.clearance = reader.number_or("clearance_mm", 0.0, Bound::not_negative);
   tolerance.event = reader.number_or("event_mm", tolerance.event, Bound::positive);
   tolerance.limit_share = reader.number_or("limit_share", 1.0, Bound::positive);
@@ -256,6 +257,29 @@ ToleranceSettings read_tolerance(TableReader reader, bool smooths) {
   reader.finish();
   return tolerance;
 }
+
+namespace {
+
+/// Where via points are wanted along a cut, mm.
+std::vector<double> read_via(TableReader& reader) {
+  const auto via = reader.numbers("via_mm");
+  if (!via) return {};
+  for (std::size_t i = 0; i < via->size(); ++i) {
+    if ((*via)[i] < 0.0)
+      reader.error("MF108", "via_mm has " + to_text((*via)[i]) + ": at least 0", "via_mm");
+    else if (i > 0 && (*via)[i] <= (*via)[i - 1])
+      reader.error("MF124",
+                   "via_mm has " + to_text((*via)[i]) + " after " + to_text((*via)[i - 1]) +
+                       ": it has to rise strictly",
+                   "via_mm");
+    else
+      continue;
+    return {};
+  }
+  return *via;
+}
+
+}  // namespace
 
 RecipeSettings read_recipe(TableReader reader) {
   RecipeSettings recipe;
@@ -271,7 +295,8 @@ RecipeSettings read_recipe(TableReader reader) {
   choose("optimise", {"jerk", "none"}, recipe.optimise);
   choose("solver", {"hybrid", "ipopt", "banded"}, recipe.solver);
   choose("schedule", {"jerk", "constant", "programmed"}, recipe.schedule);
-  recipe.knot_every = reader.integer("knot_every", 1, 1000000).value_or(recipe.knot_every);
+  recipe.knot_every = reader.integer("knot_every", 1, 64).value_or(recipe.knot_every);
+  recipe.via = read_via(reader);
   const auto share = [&](std::string_view key, double fallback) {
     const double value = reader.number_or(key, fallback, Bound::not_negative);
     if (value > 3.0)

@@ -83,12 +83,14 @@ void add_convert(CLI::App& app, CommandLine& l) {
   add_search_options(c, l);
   c->add_option("--dialect", l.dialect, "output dialect instead of the machine's");
   add_input_options(c, l);
-  c->add_option("--lead", l.lead, "freedom of the tool axis, deg");
-  c->add_option("--tilt", l.tilt, "freedom of the tool axis, deg");
+  c->add_option("--lead", l.lead,
+                "lasers: freedom of the beam along the cut around the programmed axis, deg");
+  c->add_option("--tilt", l.tilt, "the same across the cut, deg; both default to 0: kept");
   c->add_option("--smoothing", l.smoothing, "acr | ramp | none");
-  c->add_option("--orientation", l.orientation, "programmed");
-  c->add_option("--optimise", l.optimise, "none");
-  c->add_option("--schedule", l.schedule, "programmed");
+  c->add_option("--orientation", l.orientation,
+                "programmed | cone | via | monotone | qi | qi_c2 (the last five: lasers)");
+  c->add_option("--optimise", l.optimise, "jerk (lasers) | none");
+  c->add_option("--schedule", l.schedule, "constant (lasers, with --optimise jerk) | programmed");
   c->add_option("--links", l.links,
                 "plan (default): motion between cuts is ours | keep: the input's");
   c->add_option("--cuts", l.cuts, "7, 7-40 or 7-: only these cuts, with a start of their own");

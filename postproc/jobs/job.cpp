@@ -442,17 +442,25 @@ class Run {
     std::size_t failed = 0;
     const Check* tip = nullptr;
     const Check* axis = nullptr;
+    const Check* lead = nullptr;
+    const Check* tilt = nullptr;
     for (const auto& c : conversion.checks) {
       if (!c.ok) ++failed;
       if (c.name == "tip_deviation") tip = &c;
       if (c.name == "axis_deviation") axis = &c;
+      if (c.name == "lead_deviation") lead = &c;
+      if (c.name == "tilt_deviation") tilt = &c;
     }
     std::string text = result_.verdict + " (level " + conversion.level +
                        "): " + std::to_string(conversion.checks.size()) + " checks, " +
                        std::to_string(failed) + " failed";
-    if (tip && axis)
-      text += "; tip " + decimal(tip->value, 5) + " of " + decimal(tip->limit, 5) + " mm, axis " +
-              decimal(axis->value, 5) + " of " + decimal(axis->limit, 5) + " deg";
+    const auto share = [](const char* name, const Check* c, const char* unit) {
+      return std::string(name) + " " + decimal(c->value, 5) + " of " + decimal(c->limit, 5) + unit;
+    };
+    if (tip && (axis || lead)) text += "; " + share("tip", tip, " mm");
+    if (tip && axis) text += ", " + share("axis", axis, " deg");
+    if (tip && lead) text += ", " + share("lead", lead, " deg");
+    if (tip && lead && tilt) text += ", " + share("tilt", tilt, " deg");
     if (conversion.blocks > 0)
       text += "; " + std::to_string(conversion.blocks) + " blocks, " +
               decimal(conversion.scheduled_time, 1) + " s planned";

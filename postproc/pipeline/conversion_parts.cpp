@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "postproc/pipeline/planned_limits.h"
 #include "postproc/pipeline/registry.h"
 
 namespace smoothpost {
@@ -92,6 +93,16 @@ void describe_promises(const MachineDefinition& machine, bool has_part, Conversi
   if (!assumed.empty())
     out.assumes.push_back(
         "the limits of these axes are assumed, not from a datasheet, and used at 90 %: " + assumed);
+}
+
+void add_planned_limits(const MachineDefinition& machine, Conversion& out) {
+  if (out.stretches.empty()) return;
+  const Checks checks = planned_limit_checks(out.stretches, machine, out.axes);
+  out.checks.insert(out.checks.end(), checks.begin(), checks.end());
+  std::erase_if(out.not_checked, [](const std::string& name) {
+    return name == "acceleration_limit" || name == "jerk_limit";
+  });
+  out.assumes.push_back(planned_limits_assumption());
 }
 
 PartCheck::InputRegistration PartCheck::input(const ReferencePath& reference) const {

@@ -59,6 +59,8 @@ class PartCheck {
   InputRegistration input(const ReferencePath& reference) const;
 
   const RegistrationSettings& settings() const { return settings_; }
+  /// @pre ok()
+  const TriangleTree& tree() const { return tree_.value(); }
 
   Check output(const ReadBack& read, const ScrewChain& chain) const;
 
@@ -79,6 +81,10 @@ void into_part(ReadBack& read, const MachineDefinition& machine, const Pose& par
 Result<ControllerMotion> follow(ReadBack read, const MachineDefinition& machine,
                                 const Inverse& inverse, ToolTurn turn,
                                 const std::function<double(std::size_t)>& tool_length);
+
+/// Adds the checks of the accelerations and jerks that out.stretches have planned
+/// (planned_limit_checks) and what they rest on; does nothing without stretches.
+void add_planned_limits(const MachineDefinition& machine, Conversion& out);
 
 /// What a certificate takes for granted and does not check, whatever the program.
 void describe_promises(const MachineDefinition& machine, bool has_part, Conversion& out);

@@ -31,6 +31,8 @@ void describe_input(const ToolPath& path, const std::vector<Cut>& cuts,
     CutSummary summary;
     summary.label =
         "CUT " + std::to_string(cut.number) + (cut.after_rewind ? " goes on after a rewind" : "");
+    summary.first = cut.first;
+    summary.last = cut.last;
     summary.first_line = path.points[cut.first].line;
     summary.last_line = path.points[cut.last].line;
     for (std::uint32_t k = cut.first; k <= cut.last; ++k) {
@@ -460,6 +462,10 @@ class Converter {
     }
     if (in_.machine.recipe.task == "pose")
       with.whole_rotation = input_tool_rotation(chain_.tool_axis, in_.machine.recipe.spin);
+    with.orientation = orientation_input(in_.machine, reference_, cuts_,
+                                         part_ && part_->ok() ? &part_->tree() : nullptr);
+    if (with.orientation && with.orientation->free)
+      out_.assumes.push_back(orientation_assumption(*with.orientation));
     const Checks deviation = verify_deviation(motion.read, in_.machine, with, progress_);
     out_.blocks = motion.read.moves.size();
     if (turn_ != ToolTurn::none)
@@ -471,6 +477,7 @@ class Converter {
     if (part_ && part_->ok()) out_.checks.push_back(part_->output(out_.read, chain_));
     out_.checks.insert(out_.checks.end(), machine.checks.begin(), machine.checks.end());
     out_.axes = std::move(machine.axes);
+    add_planned_limits(in_.machine, out_);
     out_.scheduled_time = machine.scheduled_time;
     out_.checks.push_back(process_check(motion.read));
     for (Check& c : out_.checks) give_input_line(c);

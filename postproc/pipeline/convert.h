@@ -8,6 +8,7 @@
 #include "kernels/core/progress.h"
 #include "postproc/pipeline/cuts.h"
 #include "postproc/pipeline/interpret.h"
+#include "postproc/pipeline/laser_plan.h"
 #include "postproc/pipeline/line_map.h"
 #include "postproc/pipeline/smoothed_path.h"
 #include "postproc/pipeline/verify.h"
@@ -34,7 +35,8 @@ std::string to_string(Verdict verdict);
 
 /// A cut of the input.
 struct CutSummary {
-  std::string label;  ///< as its label in the program says: "CUT 7"
+  std::string label;                  ///< as its label in the program says: "CUT 7"
+  std::uint32_t first = 0, last = 0;  ///< segments of the input
   std::uint32_t first_line = 0;
   std::uint32_t last_line = 0;
   double length = 0.0;  ///< mm, of the tip
@@ -66,6 +68,7 @@ struct Conversion {
   double length = 0.0;  ///< mm, of the tip
   std::vector<CutSummary> cuts;
   std::vector<SmoothedCorner> corners;
+  std::vector<LaserStretch> stretches;  ///< of optimise = "jerk", in path order
   std::uint32_t merged_points = 0;
   std::size_t links = 0;
   std::size_t blocks = 0;

@@ -35,6 +35,7 @@ struct JointSample {
   JointVector q;
   bool guide = false;      ///< inside a piece of one formula: there for the choice of the joints
   bool by_joints = false;  ///< with tool moves: the way here is straight in the joints all the same
+  double time = 0.0;       ///< s, of the way here where it was planned (laser_plan); else 0
 };
 
 /// A place inside a cut that has no continuous way on: the cut has to be split there.

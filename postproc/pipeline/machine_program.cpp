@@ -205,7 +205,9 @@ class Builder {
     move.from_segment = from.segment;
     move.from_share = from.s;
     move.to_share = to.s;
-    if (!move.rapid)
+    if (to.time > 0.0)
+      move.duration = to.time;
+    else if (!move.rapid)
       move.duration = block_time(by_tool ? tool_travel(samples_[i - 1].q, move, point.tool_length)
                                          : JointVector((move.to - samples_[i - 1].q).cwiseAbs()),
                                  move, point);

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "kernels/kinematics/inverse.h"
 #include "machines/dialects/decimal.h"
 
 namespace smoothpost {
@@ -11,9 +12,13 @@ namespace {
 class Refusals {
  public:
   void refuse(const std::string& key, const std::string& value, const std::string& possible) {
+    say("US120",
+        key + " = \"" + value + "\" is not possible in this version; possible: " + possible);
+  }
+  void say(const char* code, std::string text) {
     Diagnostic d;
-    d.code = "US120";
-    d.text = key + " = \"" + value + "\" is not possible in this version; possible: " + possible;
+    d.code = code;
+    d.text = std::move(text);
     list_.push_back(std::move(d));
   }
   Diagnostics take() { return std::move(list_); }
@@ -61,6 +66,55 @@ void check_smoothing(const MachineDefinition& machine, const ToolPath& input, Re
                     "axis (five axes cannot set the rotation about the tool)");
 }
 
+bool frees_orientation(const ToleranceSettings& t) { return t.lead > 0.0 || t.tilt > 0.0; }
+
+void check_orientation(const MachineDefinition& machine, Refusals& refusals) {
+  const RecipeSettings& r = machine.recipe;
+  const bool laser = r.kind == "laser";
+  if (r.orientation == "graph" || (r.orientation != "programmed" && !laser))
+    refusals.refuse("recipe.orientation", r.orientation,
+                    laser ? "programmed, cone, via, monotone, qi, qi_c2"
+                          : "programmed (others are for recipe.kind = \"laser\")");
+  if (!frees_orientation(machine.tolerance)) return;
+  if (!laser)
+    refusals.refuse("tolerance.lead_deg and tilt_deg", "free",
+                    "0 (the programmed tool axis is kept; it can be free for recipe.kind = "
+                    "\"laser\")");
+  else if (r.orientation == "programmed")
+    refusals.refuse("tolerance.lead_deg and tilt_deg", "free",
+                    "0 while recipe.orientation = \"programmed\" keeps the tool axis; "
+                    "recipe.orientation = \"cone\" uses the freedom");
+  if (laser && machine.workpiece.thickness <= 0.0)
+    refusals.say("US123",
+                 "tolerance.lead_deg and tilt_deg free the beam, and workpiece.thickness_mm does "
+                 "not say how thick the sheet is: give it, how far a tilted beam shifts the cut's "
+                 "edge on the far side is checked by it");
+}
+
+void check_laser(const MachineDefinition& machine, Refusals& refusals) {
+  const RecipeSettings& r = machine.recipe;
+  const bool laser = r.kind == "laser";
+  const bool optimised = r.optimise == "jerk";
+  if (optimised && !laser)
+    refusals.refuse("recipe.optimise", r.optimise, "none (jerk is for recipe.kind = \"laser\")");
+  if (r.schedule == "jerk" || (r.schedule == "constant" && !(laser && optimised)))
+    refusals.refuse("recipe.schedule", r.schedule,
+                    laser && optimised ? "constant, programmed"
+                                       : "programmed (constant is for recipe.kind = \"laser\" with "
+                                         "recipe.optimise = \"jerk\")");
+  if (laser && !optimised && r.orientation != "programmed" && r.orientation != "graph")
+    refusals.refuse("recipe.optimise", r.optimise,
+                    "jerk (recipe.orientation = \"" + r.orientation + "\" is planned by it)");
+  if (!optimised || !laser) return;
+  if (machine.dialect.mode != "joint")
+    refusals.refuse("dialect.mode", machine.dialect.mode,
+                    "joint (recipe.optimise = \"jerk\" plans the joints themselves)");
+  const auto inverse = Inverse::from(chain_of(machine));
+  if (inverse && inverse->rotary_pair() == nullptr)
+    refusals.refuse("recipe.optimise", r.optimise,
+                    "none (jerk needs two rotary and three linear axes; this machine is an arm)");
+}
+
 }  // namespace
 
 ToolTurn tool_turn_of(const MachineDefinition& machine, const Dialect& dialect) {
@@ -70,14 +124,8 @@ ToolTurn tool_turn_of(const MachineDefinition& machine, const Dialect& dialect) 
 Diagnostics recipe_problems(const MachineDefinition& machine, const Dialect& dialect,
                             const ToolPath& input) {
   Refusals refusals;
-  const RecipeSettings& r = machine.recipe;
-  if (r.orientation != "programmed")
-    refusals.refuse("recipe.orientation", r.orientation, "programmed");
-  if (r.optimise != "none") refusals.refuse("recipe.optimise", r.optimise, "none");
-  if (r.schedule != "programmed") refusals.refuse("recipe.schedule", r.schedule, "programmed");
-  if (machine.tolerance.lead != 0.0 || machine.tolerance.tilt != 0.0)
-    refusals.refuse("tolerance.lead_deg and tilt_deg", "free",
-                    "0 (the programmed tool axis is kept)");
+  check_orientation(machine, refusals);
+  check_laser(machine, refusals);
   check_dialect(machine, dialect, refusals);
   check_smoothing(machine, input, refusals);
   return refusals.take();

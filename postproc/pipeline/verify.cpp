@@ -6,6 +6,7 @@
 
 #include "kernels/core/units.h"
 #include "postproc/pipeline/tool_motion.h"
+#include "postproc/pipeline/worst.h"
 
 namespace smoothpost {
 
@@ -57,40 +58,6 @@ std::vector<double> move_times(const ReadBack& read, const MachineDefinition& ma
   }
   return times;
 }
-
-/// The check with the largest value wins its place.
-class Worst {
- public:
-  void see(double value, std::uint32_t output_line, double time, std::uint32_t input_line = 0) {
-    // What is not a number stays: it must fail, never be passed over.
-    if (seen_ && (std::isnan(value_) || value <= value_)) return;
-    seen_ = true;
-    value_ = value;
-    output_line_ = output_line;
-    time_ = time;
-    input_line_ = input_line;
-  }
-  double value() const { return value_; }
-  Check check(std::string name, double limit, std::string unit) const {
-    Check c;
-    c.name = std::move(name);
-    c.value = value_;
-    c.limit = limit;
-    c.unit = std::move(unit);
-    c.ok = std::isfinite(value_) && value_ <= limit;
-    c.output_line = output_line_;
-    c.input_line = input_line_;
-    c.time_s = time_;
-    return c;
-  }
-
- private:
-  bool seen_ = false;
-  double value_ = 0.0;
-  std::uint32_t output_line_ = 0;
-  std::uint32_t input_line_ = 0;
-  double time_ = 0.0;
-};
 
 void check_axes(const ReadBack& read, const MachineDefinition& machine,
                 const std::vector<double>& times, Verification& out) {
@@ -218,7 +185,9 @@ class DeviationCheck {
  public:
   DeviationCheck(const ReadBack& read, const MachineDefinition& machine,
                  const DeviationInput& input)
-      : read_(read), machine_(machine), in_(input), times_(move_times(read, machine)) {}
+      : read_(read), machine_(machine), in_(input), times_(move_times(read, machine)) {
+    if (in_.orientation) orientation_.emplace(machine, *in_.orientation);
+  }
 
   Checks run(const Progress& progress) {
     Checks checks;
@@ -236,8 +205,7 @@ class DeviationCheck {
         }
       }
       checks.push_back(tip_.check("tip_deviation", machine_.tolerance.tip, "mm"));
-      checks.push_back(
-          axis_.check("axis_deviation", degrees_from_radians(machine_.tolerance.axis), "deg"));
+      add_axis_checks(checks);
       if (in_.whole_rotation)
         checks.push_back(rotation_.check("rotation_deviation",
                                          degrees_from_radians(machine_.tolerance.axis), "deg"));
@@ -263,6 +231,19 @@ class DeviationCheck {
   }
 
  private:
+  void add_axis_checks(Checks& checks) const {
+    const bool all_free = orientation_ && in_.orientation->free && !axis_.seen();
+    if (!all_free)
+      checks.push_back(
+          axis_.check("axis_deviation", degrees_from_radians(machine_.tolerance.axis), "deg"));
+    if (orientation_) {
+      const Checks of_beam = orientation_->checks();
+      checks.insert(checks.end(), of_beam.begin(), of_beam.end());
+    }
+    if (!machine_.standoff.axis.empty())
+      checks.push_back(standoff_.check("standoff_deviation", machine_.tolerance.tip, "mm"));
+  }
+
   // Every motion of the text is one entry of the map, in order, and the entries of the input's
   // segments follow each other without a gap from the first to the last.
   void check_map() {
@@ -352,7 +333,8 @@ class DeviationCheck {
       const auto input = in_.reference.second_derivative_bound(piece.segment);
       const double tip_bend = part * part * own.tip + span * span * input.tip;
       const double axis_bend = part * part * own.axis + span * span * input.axis;
-      const int steps = steps_for(tip_bend, axis_bend);
+      const int steps = std::max(steps_for(tip_bend, axis_bend), orientation_steps(piece));
+      if (orientation_) orientation_->begin();
       const double h2 = 1.0 / (8.0 * steps * steps);
       for (int k = 0; k <= steps; ++k) {
         const double share = static_cast<double>(k) / steps;
@@ -363,6 +345,11 @@ class DeviationCheck {
         compare_pose_at(i, pose, {piece.segment, s}, {h2 * tip_bend, h2 * axis_bend + allowance});
       }
     }
+  }
+
+  int orientation_steps(const Piece& piece) const {
+    if (!orientation_ || !orientation_->covers(piece.segment)) return 1;
+    return orientation_->least_steps(in_.reference.length(piece.segment) * (piece.to - piece.from));
   }
 
   /// What may be added between samples: of the tip (mm) and of the axis (chord).
@@ -378,11 +365,17 @@ class DeviationCheck {
     const std::uint32_t line = in_.reference.path().points[place.segment].line;
     const double roundings_tip = in_.rounding.empty() ? 0.0 : in_.rounding[i].tip;
     const double roundings_axis = in_.rounding.empty() ? 0.0 : in_.rounding[i].rotation;
-    tip_.see((pose.translation() - wanted.tip).norm() + allowance.tip + roundings_tip,
-             read_.moves[i].line, times_[i], line);
-    const double chord = (axis - wanted.axis).norm() + allowance.axis + roundings_axis;
-    axis_.see(degrees_from_radians(2.0 * std::asin(std::min(1.0, 0.5 * chord))),
-              read_.moves[i].line, times_[i], line);
+    const Vec3 off = pose.translation() - wanted.tip;
+    tip_.see(off.norm() + allowance.tip + roundings_tip, read_.moves[i].line, times_[i], line);
+    standoff_.see(std::abs(off.dot(axis)) + allowance.tip + roundings_tip, read_.moves[i].line,
+                  times_[i], line);
+    const double rest = allowance.axis + roundings_axis;
+    if (orientation_ && orientation_->covers(place.segment))
+      orientation_->see({place, axis, rest, wanted_beam(i), line, read_.moves[i].line, times_[i]});
+    if (!orientation_ || !orientation_->frees(place.segment))
+      axis_.see(degrees_from_radians(
+                    2.0 * std::asin(std::min(1.0, 0.5 * ((axis - wanted.axis).norm() + rest)))),
+                read_.moves[i].line, times_[i], line);
     if (!in_.whole_rotation) return;
     const Mat3 tool = pose.linear() * *in_.whole_rotation;
     const double angle =
@@ -591,7 +584,8 @@ class DeviationCheck {
   const MachineDefinition& machine_;
   const DeviationInput& in_;
   std::vector<double> times_;
-  Worst tip_, axis_, rotation_, event_, pose_tip_, pose_turn_;
+  Worst tip_, axis_, standoff_, rotation_, event_, pose_tip_, pose_turn_;
+  std::optional<OrientationCheck> orientation_;
   bool has_poses_ = false;
   std::array<Worst, kMaxJoints> joints_;
   double wrong_beam_ = 0.0;

@@ -9,6 +9,7 @@
 #include "postproc/pipeline/controller_blending.h"
 #include "postproc/pipeline/line_map.h"
 #include "postproc/pipeline/links.h"
+#include "postproc/pipeline/orientation_check.h"
 #include "postproc/pipeline/reference_path.h"
 
 namespace smoothpost {
@@ -20,6 +21,8 @@ struct AxisSummary {
   double position_low = 0.0;
   double position_high = 0.0;
   double peak_velocity = 0.0;
+  /// Of the plan, where there is one that knows them.
+  std::optional<double> peak_acceleration = {}, peak_jerk = {}, rms_jerk = {};
   double limit_velocity = 0.0;
   double limit_acceleration = 0.0;
   double limit_jerk = 0.0;
@@ -50,6 +53,8 @@ struct DeviationInput {
   /// R_chain,input = R_W,chain^T · R_W,input, constant (input_tool_rotation()); given: rotations
   /// are compared whole (task = "pose").
   std::optional<Mat3> whole_rotation = {};
+  /// Given: what a beam's orientation is judged by (OrientationCheck).
+  std::optional<OrientationInput> orientation = {};
 };
 
 /// The output's text, read back, against the input: tip and tool axis everywhere along every block

@@ -44,6 +44,63 @@ Json diagnostic_json(const Diagnostic& d) {
           {"code", d.code},           {"text", d.text}};
 }
 
+Json qp_json(const QpReport& q) {
+  return {{"name", q.name},
+          {"solver", q.solver},
+          {"status", q.status},
+          {"objective", number(q.objective)},
+          {"iterations", q.iterations},
+          {"kkt", number(q.kkt)},
+          {"violation", number(q.violation)}};
+}
+
+Json slowed_json(const LaserStretch& s) {
+  // "B jerk" is the jerk limit of joint B; anything else is told as it is.
+  const auto space = s.slowed_by.find(' ');
+  const std::string limit = space == std::string::npos ? "" : s.slowed_by.substr(space + 1);
+  const bool of_joint = limit == "velocity" || limit == "acceleration" || limit == "jerk";
+  Json j;
+  j["joint"] = of_joint ? Json(s.slowed_by.substr(0, space)) : Json(nullptr);
+  j["limit"] = of_joint ? limit : s.slowed_by;
+  if (!s.slowed_lines.empty()) {
+    const auto [low, high] = std::minmax_element(s.slowed_lines.begin(), s.slowed_lines.end());
+    j["input_lines"] = {*low, *high};
+  }
+  j["factor"] = s.programmed_feed > 0.0 ? number(s.feed / s.programmed_feed) : Json(nullptr);
+  return j;
+}
+
+/// What was optimised in the cut; nothing when nothing was.
+void add_stretches(const CutSummary& cut, const std::vector<LaserStretch>& stretches, Json& j) {
+  int points = 0, via = 0, passes = 0, count = 0;
+  bool from_part = true;
+  double feed = 0.0;
+  Json qp = Json::array();
+  Json slowed = Json::array();
+  const auto begin =
+      std::lower_bound(stretches.begin(), stretches.end(), cut.first,
+                       [](const LaserStretch& s, std::uint32_t k) { return s.first < k; });
+  for (auto at = begin; at != stretches.end() && at->last <= cut.last; ++at) {
+    const LaserStretch& s = *at;
+    feed = count++ == 0 ? s.feed : std::min(feed, s.feed);
+    points += s.control_points;
+    via += s.via_points;
+    passes += s.passes;
+    from_part = from_part && s.normal_from_part;
+    for (const QpReport& q : s.qp) qp.push_back(qp_json(q));
+    if (!s.slowed_by.empty()) slowed.push_back(slowed_json(s));
+  }
+  if (count == 0) return;
+  j["stretches"] = count;
+  j["control_points"] = points;
+  j["via_points"] = via;
+  j["passes"] = passes;
+  j["normal"] = from_part ? "part" : "programmed";
+  j["feed_mm_per_min"] = number(kSecondsPerMinute * feed);
+  j["qp"] = std::move(qp);
+  j["slowed_by"] = std::move(slowed);
+}
+
 Json cut_json(const CutSummary& c) {
   return {{"label", c.label},
           {"input_lines", {c.first_line, c.last_line}},
@@ -57,19 +114,25 @@ Json cut_json(const CutSummary& c) {
 }
 
 Json axis_json(const AxisSummary& a) {
-  // Acceleration and jerk of a program at level geometry are the controller's: null, not zero.
+  // Acceleration and jerk of a program at level geometry are the controller's, unless a plan says
+  // what it has asked for: null, not zero.
+  const auto known = [](const std::optional<double>& value) {
+    return value ? number(*value) : Json(nullptr);
+  };
   return {{"name", a.name},
           {"unit", a.unit},
           {"position", {number(a.position_low), number(a.position_high)}},
           {"peak",
-           {{"velocity", number(a.peak_velocity)}, {"acceleration", nullptr}, {"jerk", nullptr}}},
+           {{"velocity", number(a.peak_velocity)},
+            {"acceleration", known(a.peak_acceleration)},
+            {"jerk", known(a.peak_jerk)}}},
           {"limit",
            {{"velocity", number(a.limit_velocity)},
             {"acceleration", number(a.limit_acceleration)},
             {"jerk", number(a.limit_jerk)},
             {"source", a.source}}},
           {"input_peak", nullptr},
-          {"rms_jerk", nullptr},
+          {"rms_jerk", known(a.rms_jerk)},
           {"input_rms_jerk", nullptr},
           {"rounding_jerk", nullptr}};
 }
@@ -172,7 +235,7 @@ std::string report_json(const Conversion& c, const ReportContext& context) {
   constexpr std::size_t kMostCuts = 10000;
   Json cuts = Json::array();
   for (std::size_t i = 0; i < std::min(c.cuts.size(), kMostCuts); ++i)
-    cuts.push_back(cut_json(c.cuts[i]));
+    add_stretches(c.cuts[i], c.stretches, cuts.emplace_back(cut_json(c.cuts[i])));
   constexpr std::size_t kMostCorners = 10000;
   j["corners"] = corners_json(c.corners, kMostCorners);
   if (c.corners.size() > kMostCorners) j["corners_in_all"] = c.corners.size();

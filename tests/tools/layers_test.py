@@ -31,9 +31,10 @@ cstdint cstdio cstdlib cstring ctime cuchar cwchar cwctype
 # The public header is C: it may use C's own headers.
 C_HEADERS = {"stddef.h", "stdint.h", "stdbool.h"}
 
-# Units that have no place in the names of kernels/: a bare name is in mm, rad, s.
+# Units that have no place in the names of kernels/: a bare name is in mm, rad, s. (A spline has a
+# degree: that word is not one of them.)
 UNIT_SUFFIXES = """
-deg degree degrees inch inches foot feet min_per per_min per_minute rpm ms us millis milliseconds
+deg degrees inch inches foot feet min_per per_min per_minute rpm ms us millis milliseconds
 minute minutes metre metres meter meters m_per_s m_per_s2 m_per_s3 percent
 """.split()
 UNIT_NAME = re.compile(

@@ -350,10 +350,47 @@ TEST_CASE("machine file: values out of their range", "[machines][definition]") {
   check_value(base_and("[cycle]\ntime_ms = 0\n"), "MF108", "time_ms = 0");
   check_value(base_and("[cycle]\nlook_ahead_blocks = -1\n"), "MF108", "look_ahead_blocks = -1");
   check_value(base_and("[recipe]\nknot_every = 0\n"), "MF108", "knot_every = 0");
+  check_value(base_and("[recipe]\nknot_every = 65\n"), "MF108", "knot_every = 65");
+  check_value(base_and("[recipe]\nvia_mm = [-1, 2]\n"), "MF108", "via_mm = [-1, 2]");
+  check_value(base_and("[tolerance]\nexit_edge_mm = 0\n"), "MF108", "exit_edge_mm = 0");
   check_value(base_and("[links]\nclearance_mm = -1\n"), "MF108", "clearance_mm = -1");
   check_value(base_and("[standoff]\nreserve_mm = -1\n"), "MF108", "reserve_mm = -1");
   check_value(base_and("[workpiece]\nthickness_mm = -1\n"), "MF108", "thickness_mm = -1");
   check_error(base_and("[process.events]\nx = { text = \"M3\", dwell_s = -1 }\n"), "MF108", "-1 }");
+}
+
+TEST_CASE("machine file: the settings of a laser", "[machines][definition]") {
+  const MachineDefinition none = parse(kBase);
+  CHECK(none.recipe.via.empty());
+  CHECK_FALSE(none.tolerance.exit_edge.has_value());
+  const MachineDefinition m =
+      parse(base_and("[tolerance]\nexit_edge_mm = 0.25\n"
+                     "[recipe]\nvia_mm = [0, 36.5, 100]\nknot_every = 64\n"));
+  CHECK(m.recipe.via == std::vector<double>{0.0, 36.5, 100.0});
+  CHECK(m.recipe.knot_every == 64);
+  CHECK(m.tolerance.exit_edge == 0.25);
+  CHECK(parse(kBase, {{"recipe.via_mm", "[0,100]"}}).recipe.via == std::vector<double>{0.0, 100.0});
+  for (const char* word : {"programmed", "qi", "qi_c2", "via", "cone", "monotone", "graph"})
+    CHECK(parse(base_and("[recipe]\norientation = \"" + std::string(word) + "\"\n"))
+              .recipe.orientation == word);
+  for (const char* word : {"hybrid", "ipopt", "banded"})
+    CHECK(parse(base_and("[recipe]\nsolver = \"" + std::string(word) + "\"\n")).recipe.solver ==
+          word);
+  for (const char* word : {"jerk", "constant", "programmed"})
+    CHECK(parse(base_and("[recipe]\nschedule = \"" + std::string(word) + "\"\n")).recipe.schedule ==
+          word);
+}
+
+TEST_CASE("machine file: via points rise", "[machines][definition]") {
+  check_value(base_and("[recipe]\nvia_mm = [0, 5, 5]\n"), "MF124", "via_mm = [0, 5, 5]");
+  check_value(base_and("[recipe]\nvia_mm = 5\n"), "MF106", "via_mm = 5");
+}
+
+TEST_CASE("machine file: words that the recipe does not know", "[machines][definition]") {
+  check_value(base_and("[recipe]\norientation = \"free\"\n"), "MF113", "orientation = \"free\"");
+  check_value(base_and("[recipe]\nsolver = \"osqp\"\n"), "MF113", "solver = \"osqp\"");
+  check_value(base_and("[recipe]\noptimise = \"time\"\n"), "MF113", "optimise = \"time\"");
+  check_value(base_and("[recipe]\nschedule = \"fast\"\n"), "MF113", "schedule = \"fast\"");
 }
 
 TEST_CASE("machine file: numbers that are none", "[machines][definition]") {

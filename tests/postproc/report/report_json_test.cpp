@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 
 using namespace smoothpost;
 
@@ -79,6 +80,83 @@ TEST_CASE("changed_checks: verdicts, values, new and absent checks", "[postproc]
   other.verdict = Verdict::refused;
   CHECK(contains(changed_checks(before, report_json(other, {}), 0.05), "verdict"));
   CHECK_FALSE(changed_checks("", before, 0.05).empty());
+}
+
+TEST_CASE("report_json: what was optimised in a cut", "[postproc][report]") {
+  Conversion c = sample();
+  CutSummary first, second, plain;
+  first.label = "CUT 1";
+  first.first = 2;
+  first.last = 9;
+  second.label = "CUT 2";
+  second.first = 12;
+  second.last = 20;
+  plain.label = "CUT 3";
+  plain.first = 22;
+  plain.last = 23;
+  c.cuts = {first, second, plain};
+  LaserStretch a, b, d;
+  a.first = 2;
+  a.last = 5;
+  a.feed = 100.0;
+  a.programmed_feed = 250.0;
+  a.slowed_by = "B jerk";
+  a.slowed_lines = {8, 6, 7};
+  a.control_points = 79;
+  a.via_points = 2;
+  a.passes = 6;
+  a.normal_from_part = true;
+  a.qp.push_back({"rotary", "ipopt", "optimal", 0.125, 11, 1e-10, 2e-12});
+  b = a;
+  b.first = 6;
+  b.last = 9;
+  b.feed = 200.0;
+  b.slowed_by = "the standoff's reserve";
+  b.slowed_lines.clear();
+  b.qp.clear();
+  d.first = 12;
+  d.last = 20;
+  d.feed = 250.0;
+  c.stretches = {a, b, d};
+  AxisSummary axis;
+  axis.name = "B";
+  axis.peak_acceleration = 1.5;
+  axis.peak_jerk = 2.5;
+  axis.rms_jerk = 0.75;
+  AxisSummary unknown;
+  unknown.name = "C";
+  c.axes = {axis, unknown};
+  const auto json = nlohmann::json::parse(report_json(c, {}));
+  const auto& cut = json["cuts"][0];
+  CHECK(cut["stretches"] == 2);
+  CHECK(cut["control_points"] == 158);
+  CHECK(cut["via_points"] == 4);
+  CHECK(cut["passes"] == 12);
+  CHECK(cut["normal"] == "part");
+  CHECK(cut["feed_mm_per_min"] == 6000.0);
+  REQUIRE(cut["qp"].size() == 1);
+  CHECK(cut["qp"][0] == nlohmann::json({{"name", "rotary"},
+                                        {"solver", "ipopt"},
+                                        {"status", "optimal"},
+                                        {"objective", 0.125},
+                                        {"iterations", 11},
+                                        {"kkt", 1e-10},
+                                        {"violation", 2e-12}}));
+  REQUIRE(cut["slowed_by"].size() == 2);
+  CHECK(cut["slowed_by"][0]["joint"] == "B");
+  CHECK(cut["slowed_by"][0]["limit"] == "jerk");
+  CHECK(cut["slowed_by"][0]["input_lines"] == nlohmann::json({6, 8}));
+  CHECK(cut["slowed_by"][0]["factor"] == 0.4);
+  CHECK(cut["slowed_by"][1]["joint"].is_null());
+  CHECK(cut["slowed_by"][1]["limit"] == "the standoff's reserve");
+  CHECK(json["cuts"][1]["normal"] == "programmed");
+  CHECK(json["cuts"][1]["slowed_by"].empty());
+  CHECK_FALSE(json["cuts"][2].contains("qp"));
+  CHECK(json["axes"][0]["peak"]["acceleration"] == 1.5);
+  CHECK(json["axes"][0]["peak"]["jerk"] == 2.5);
+  CHECK(json["axes"][0]["rms_jerk"] == 0.75);
+  CHECK(json["axes"][1]["peak"]["jerk"].is_null());
+  CHECK(json["axes"][1]["rms_jerk"].is_null());
 }
 
 TEST_CASE("line_map_json: one row a motion", "[postproc][report]") {

@@ -1,0 +1,316 @@
+#include "kernels/optimise/rotary_jerk.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/core/contract.h"
+#include "kernels/qp/hybrid_solver.h"
+
+namespace smoothpost {
+
+namespace {
+
+constexpr double kStill = 1e-7;      // rad: rotaries of two passes are the same
+constexpr double kSameObjective = 1e-6;
+constexpr double kHolds = 1e-9;      // a window is kept
+constexpr double kTimeShare = 1e-5;  // relative accuracy of the least time
+
+/// A half-space normal·O ≥ 0.
+struct HalfSpace {
+  Vec3 normal;
+  std::string_view name;
+};
+
+/// The half-spaces of a window with unit normals; the widest cone by its tangent plane towards
+/// `axis`, where it is nearer than the corners of lead and tilt.
+std::vector<HalfSpace> half_spaces(const OrientationWindow& w, const Vec3& axis) {
+  std::vector<HalfSpace> list;
+  list.push_back({(std::tan(w.lead_high) * w.normal - w.tangent).normalized(), "lead"});
+  list.push_back({(w.tangent - std::tan(w.lead_low) * w.normal).normalized(), "lead"});
+  list.push_back({(std::tan(w.tilt_high) * w.normal - w.binormal).normalized(), "tilt"});
+  list.push_back({(w.binormal - std::tan(w.tilt_low) * w.normal).normalized(), "tilt"});
+  const double lead = std::tan(std::max(std::abs(w.lead_low), std::abs(w.lead_high)));
+  const double tilt = std::tan(std::max(std::abs(w.tilt_low), std::abs(w.tilt_high)));
+  const Vec3 aside = axis - axis.dot(w.normal) * w.normal;
+  if (std::hypot(lead, tilt) > std::tan(w.widest) && aside.norm() > 1e-6)
+    list.push_back({std::sin(w.widest) * w.normal - std::cos(w.widest) * aside.normalized(), "gap"});
+  return list;
+}
+
+double smallest_limit(const std::array<RateLimits, 2>& limits) {
+  const double least = std::min(limits[0].jerk, limits[1].jerk);
+  return std::isfinite(least) ? least : 1.0;
+}
+
+double finite_or_one(double value) { return std::isfinite(value) ? value : 1.0; }
+
+/// The passes over one problem.
+class Passes {
+ public:
+  Passes(const RotaryProblem& problem, const RotarySettings& settings)
+      : in_(problem), settings_(settings), joints_(problem.held) {
+    require(in_.chain != nullptr && in_.held.size() == in_.chain->size(), "a chain and its joints");
+    require(in_.knots.degree == 5, "quintic splines");
+    require(in_.seed.size() == in_.windows.size(), "a seed for every window");
+    at_ = in_.seed;
+  }
+
+  /// The programme with limits of one piece taking t times as long, linear about the last pass.
+  QuadraticProgram programme(double t, double objective_scale) const {
+    SplineLayout layout = spline_layout(in_.knots, 3, 2);
+    for (int c = 0; c < 2; ++c) {
+      const RateLimits l = slowed(in_.limits[static_cast<std::size_t>(c)], t);
+      layout.scale(c, 1) = finite_or_one(l.velocity);
+      layout.scale(c, 2) = finite_or_one(l.acceleration);
+      layout.scale(c, 3) = finite_or_one(l.jerk);
+    }
+    QuadraticProgram qp = empty_program(layout);
+    for (int c = 0; c < 2; ++c) {
+      add_derivative_cost(qp, c, 3, 2.0 * objective_scale);
+      const RateLimits l = slowed(in_.limits[static_cast<std::size_t>(c)], t);
+      const double limits[] = {l.velocity, l.acceleration, l.jerk};
+      for (int level = 1; level <= 3; ++level)
+        if (std::isfinite(limits[level - 1])) limit_level(qp, c, level, limits[level - 1]);
+      for (int j = 0; j < qp.layout.count(0); ++j) {
+        qp.lower[qp.layout.index(c, 0, j)] = in_.lower[static_cast<std::size_t>(c)];
+        qp.upper[qp.layout.index(c, 0, j)] = in_.upper[static_cast<std::size_t>(c)];
+      }
+      if (in_.rest_at_ends)
+        for (const int level : {1, 2})
+          for (const int j : {0, qp.layout.count(level) - 1})
+            qp.lower[qp.layout.index(c, level, j)] = qp.upper[qp.layout.index(c, level, j)] = 0.0;
+    }
+    if (in_.monotone) add_monotone(qp);
+    set_rows(qp, rows(qp.layout));
+    return qp;
+  }
+
+  /// Moves the place of linearisation to the spline; false: it went only half the way.
+  bool follow(const SplineCurve& q) {
+    std::vector<std::array<double, 2>> next(at_.size());
+    double worst = 0.0, change = 0.0;
+    for (std::size_t i = 0; i < at_.size(); ++i) {
+      const Eigen::VectorXd value = q.at(in_.windows[i].u);
+      next[i] = {value[0], value[1]};
+      change = std::max({change, std::abs(value[0] - at_[i][0]), std::abs(value[1] - at_[i][1])});
+      worst = std::max(worst, in_.windows[i].outside(axis_at(next[i])));
+    }
+    const bool worse = passes_ > 0 && worst > 1e-3 && worst > 1.5 * outside_;
+    if (worse)
+      for (std::size_t i = 0; i < at_.size(); ++i)
+        for (std::size_t c = 0; c < 2; ++c) next[i][c] = 0.5 * (next[i][c] + at_[i][c]);
+    at_ = std::move(next);
+    outside_ = worst;
+    change_ = change;
+    ++passes_;
+    return !worse;
+  }
+
+  /// `objective` is that of this pass' programme.
+  bool settled(double objective) {
+    const bool same = std::abs(objective - objective_) <= kSameObjective * (1.0 + std::abs(objective));
+    objective_ = objective;
+    return outside_ <= kHolds && (change_ <= kStill || same);
+  }
+  double outside() const { return outside_; }
+  int passes() const { return passes_; }
+
+ private:
+  Vec3 axis_at(const std::array<double, 2>& q) const {
+    joints_[in_.joints[0]] = q[0];
+    joints_[in_.joints[1]] = q[1];
+    return forward_location(*in_.chain, joints_).axis;
+  }
+
+  std::vector<NewRow> rows(const SplineLayout& layout) const {
+    std::vector<NewRow> list;
+    for (const RotaryVia& via : in_.via)
+      for (int c = 0; c < 2; ++c) {
+        const double value = via.q[static_cast<std::size_t>(c)];
+        list.push_back({local_row(layout, c, via.u, 0), value, value, "via point", via.u});
+      }
+    for (std::size_t i = 0; i < in_.windows.size(); ++i) add_window(layout, i, list);
+    return list;
+  }
+
+  void add_window(const SplineLayout& layout, std::size_t i, std::vector<NewRow>& list) const {
+    const OrientationWindow& w = in_.windows[i];
+    const Vec3 axis = axis_at(at_[i]);
+    const Jacobian jac = jacobian(*in_.chain, joints_);
+    std::array<Vec3, 2> slope;
+    for (std::size_t c = 0; c < 2; ++c)
+      slope[c] = Vec3(jac.col(in_.joints[c]).head<3>()).cross(axis);
+    const LocalRow first = local_row(layout, 0, w.u, 0);
+    const LocalRow second = local_row(layout, 1, w.u, 0);
+    for (const HalfSpace& h : half_spaces(w, axis)) {
+      const double a = h.normal.dot(slope[0]), b = h.normal.dot(slope[1]);
+      NewRow row;
+      row.row = first;
+      row.row.weights = a * first.weights + b * second.weights;
+      row.lower = settings_.cone_margin - h.normal.dot(axis) + a * at_[i][0] + b * at_[i][1];
+      row.upper = std::numeric_limits<double>::infinity();
+      row.name = h.name;
+      row.place = w.u;
+      list.push_back(std::move(row));
+    }
+  }
+
+  // Between two vias the first derivative's control points have the sign of the step.
+  void add_monotone(QuadraticProgram& qp) const {
+    for (int c = 0; c < 2; ++c)
+      for (int j = 0; j < qp.layout.count(1); ++j) {
+        const double u = qp.layout.place(1, j);
+        const auto behind = std::find_if(in_.via.begin(), in_.via.end(),
+                                         [u](const RotaryVia& v) { return v.u >= u; });
+        if (behind == in_.via.begin() || behind == in_.via.end()) continue;
+        const double step = behind->q[static_cast<std::size_t>(c)] -
+                            std::prev(behind)->q[static_cast<std::size_t>(c)];
+        const int k = qp.layout.index(c, 1, j);
+        if (step >= 0.0) qp.lower[k] = std::max(qp.lower[k], 0.0);
+        if (step <= 0.0) qp.upper[k] = std::min(qp.upper[k], 0.0);
+      }
+  }
+
+  const RotaryProblem& in_;
+  const RotarySettings& settings_;
+  mutable JointVector joints_;
+  std::vector<std::array<double, 2>> at_;
+  double outside_ = 0.0;
+  double change_ = 0.0;
+  double objective_ = -1.0;
+  int passes_ = 0;
+};
+
+SplineCurve curve_of(const QuadraticProgram& qp, const QpSolution& s) {
+  return {qp.layout.knots, controls_of(qp.layout, s.x)};
+}
+
+// Of ∫ (q''')², so that the objective is of the order of 1 when a rotary is at its jerk limit.
+double scale_of(const RotaryProblem& problem, double t) {
+  const double jerk = smallest_limit(problem.limits) * t * t * t;
+  return 1.0 / (jerk * jerk * problem.knots.spans());
+}
+
+/// Relaxation of the limits of derivatives by a longer time: weight l for level l.
+Relaxation by_time(const QuadraticProgram& qp) {
+  Relaxation r;
+  r.bound_weight = Eigen::VectorXd::Zero(qp.layout.size());
+  r.row_weight = Eigen::VectorXd::Zero(qp.row_count());
+  for (int c = 0; c < qp.layout.channels; ++c)
+    for (int level = 1; level <= qp.layout.levels; ++level)
+      for (int j = 0; j < qp.layout.count(level); ++j) {
+        const int k = qp.layout.index(c, level, j);
+        if (qp.lower[k] < qp.upper[k]) r.bound_weight[k] = level;
+      }
+  return r;
+}
+
+/// Relaxation of the windows alone.
+Relaxation by_cone(const QuadraticProgram& qp) {
+  Relaxation r;
+  r.bound_weight = Eigen::VectorXd::Zero(qp.layout.size());
+  r.row_weight = Eigen::VectorXd::Zero(qp.row_count());
+  for (int i = 0; i < qp.row_count(); ++i)
+    if (qp.row_lower[i] < qp.row_upper[i]) r.row_weight[i] = 1.0;
+  return r;
+}
+
+bool usable(const QpSolution& s) {
+  return s.status == QpStatus::optimal || s.certificate.violation < 1e-7;
+}
+
+}  // namespace
+
+RateLimits slowed(const RateLimits& limits, double t) {
+  return {limits.velocity * t, limits.acceleration * t * t, limits.jerk * t * t * t};
+}
+
+double OrientationWindow::outside(const Vec3& axis) const {
+  double worst = -1.0;
+  for (const HalfSpace& h : half_spaces(*this, axis)) worst = std::max(worst, -h.normal.dot(axis));
+  return worst;
+}
+
+RotaryResult optimise_rotaries(const RotaryProblem& problem, const RotarySettings& settings) {
+  Passes passes(problem, settings);
+  RotaryResult out;
+  QpSettings banded = settings.solver;
+  if (settings.hybrid) banded.solver = QpSolver::banded;
+  QuadraticProgram qp;
+  for (int pass = 0; pass < settings.most_passes; ++pass) {
+    qp = passes.programme(1.0, scale_of(problem, 1.0));
+    out.solution = solve_qp(qp, banded);
+    if (out.solution.status != QpStatus::optimal) {
+      // Windows may be out of reach of the linear model: nearer by the elastic form, then again.
+      QuadraticProgram elastic = qp;
+      elastic.relaxation = by_cone(qp);
+      out.why = feasibility(elastic, banded);
+      out.status = usable(out.why.solution) ? RotaryStatus::too_fast : RotaryStatus::solver_failed;
+      if (!usable(out.why.solution) || problem.windows.empty()) return out;
+      out.solution = out.why.solution;
+    } else {
+      out.status = RotaryStatus::not_converged;
+    }
+    out.q = curve_of(qp, out.solution);
+    passes.follow(out.q);
+    out.passes = passes.passes();
+    out.outside = passes.outside();
+    if (out.status == RotaryStatus::not_converged && (problem.windows.empty() || passes.settled(out.solution.objective))) {
+      out.status = RotaryStatus::optimal;
+      break;
+    }
+  }
+  if (out.status == RotaryStatus::not_converged && out.outside <= kHolds) out.status = RotaryStatus::optimal;
+  if (out.status != RotaryStatus::optimal) return out;
+  if (settings.hybrid) {
+    const QpSolution last = solve_by_hybrid(qp, settings.solver, out.solution);
+    if (last.status != QpStatus::optimal) {
+      out.status = RotaryStatus::solver_failed;
+      out.solution = last;
+      return out;
+    }
+    out.solution = last;
+    out.q = curve_of(qp, last);
+  }
+  out.solution.objective /= scale_of(problem, 1.0);
+  return out;
+}
+
+RotaryTime least_rotary_time(const RotaryProblem& problem, double least,
+                             const RotarySettings& settings) {
+  Passes passes(problem, settings);
+  RotaryTime out;
+  double t = least;
+  for (int pass = 0; pass < settings.most_passes; ++pass) {
+    QuadraticProgram qp = passes.programme(t, scale_of(problem, t));
+    qp.relaxation = by_time(qp);
+    const QpFeasibility answer = feasibility(qp, settings.solver);
+    if (!usable(answer.solution)) {
+      qp.relaxation = by_cone(qp);
+      out.why = feasibility(qp, settings.solver);
+      out.status = usable(out.why.solution) && out.why.shortfall > 1e-7 ? RotaryStatus::cone_empty
+                                                                        : RotaryStatus::solver_failed;
+      if (out.status != RotaryStatus::cone_empty) return out;
+      out.q = curve_of(qp, out.why.solution);
+      passes.follow(out.q);
+      out.passes = passes.passes();
+      continue;
+    }
+    out.why = answer;
+    out.q = curve_of(qp, answer.solution);
+    const double before = t;
+    // t(1 + 3τ)^(1/3) is a lower bound of the answer, t(1 + τ) an upper one.
+    t = std::max(least, t * std::cbrt(std::max(1e-3, 1.0 + 3.0 * answer.shortfall)));
+    passes.follow(out.q);
+    out.passes = passes.passes();
+    out.status = RotaryStatus::not_converged;
+    if (passes.outside() < 1e-6 && std::abs(t / before - 1.0) < kTimeShare) {
+      out.status = RotaryStatus::optimal;
+      break;
+    }
+  }
+  out.factor = t * (1.0 + 3.0 * kTimeShare);
+  return out;
+}
+
+}  // namespace smoothpost

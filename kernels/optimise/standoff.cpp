@@ -1,0 +1,367 @@
+#include "kernels/optimise/standoff.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "kernels/core/contract.h"
+#include "kernels/spline/gauss_rule.h"
+
+namespace smoothpost {
+namespace {
+
+constexpr int kDegree = 5;
+constexpr int kLevels = 3;
+constexpr int kGaussPoints = 5;
+constexpr double kBinomial[4][4] = {{1, 0, 0, 0}, {1, 1, 0, 0}, {1, 2, 1, 0}, {1, 3, 3, 1}};
+// How many times the linears' jerk that of q6 is taken to be, for the size of the variables.
+constexpr double kJerks = 10.0;
+constexpr double kTiny = 1e-300;
+// The objective is divided by the held standoff's, but by no less than this share of what a jerk
+// of the size of the variables would make: a straight path has 0.
+constexpr double kLeastObjective = 1e-6;
+// The time factor is known when its bracket is this narrow, or after so many programmes.
+constexpr double kTimeAccuracy = 5e-5;
+constexpr int kMaxSolves = 20;
+// A least τ above this is no rounding: the limits are too narrow.
+constexpr double kFeasible = 1e-8;
+
+constexpr std::string_view kRowNames[3][3] = {
+    {"velocity of the first linear", "acceleration of the first linear",
+     "jerk of the first linear"},
+    {"velocity of the second linear", "acceleration of the second linear",
+     "jerk of the second linear"},
+    {"velocity of the third linear", "acceleration of the third linear",
+     "jerk of the third linear"}};
+
+double limit_of(const RateLimits& limits, int order) {
+  if (order == 1) return limits.velocity;
+  return order == 2 ? limits.acceleration : limits.jerk;
+}
+
+/// The limits when each piece takes t times as long.
+RateLimits slowed(const RateLimits& limits, double t) {
+  return {limits.velocity * t, limits.acceleration * t * t, limits.jerk * t * t * t};
+}
+
+StandoffOptions slowed(StandoffOptions settings, double t) {
+  settings.standoff = slowed(settings.standoff, t);
+  for (RateLimits& limits : settings.linear) limits = slowed(limits, t);
+  return settings;
+}
+
+/// A place of the path with the linears as functions of what q6 is off the middle of its range.
+struct Place {
+  double u = 0.0;
+  double weight = 0.0;  ///< of the quadrature
+  LinearsByStandoff linears;
+};
+
+/// What does not change with the limits.
+struct Task {
+  SplineKnots knots;
+  double middle = 0.0;
+  double half = 0.0;
+  std::vector<Place> quadrature;
+  std::vector<Place> row_places;
+  double held_jerk = 0.0;  ///< Σ ∫ (q_i''')² du with q6 in the middle
+
+  double length() const { return knots.last() - knots.first(); }
+};
+
+Place place_at(const HeadGeometry& head, const SplineCurve& tip, const SplineCurve& rotary,
+               double u) {
+  VectorJet tip_jet;
+  Jet q4;
+  Jet q5;
+  for (int r = 0; r < 4; ++r) {
+    tip_jet.col(r) = tip.at(u, r);
+    const Eigen::VectorXd angles = rotary.at(u, r);
+    q4[r] = angles[0];
+    q5[r] = angles[1];
+  }
+  return {u, 0.0, linears_by_standoff(head, tip_jet, q4, q5)};
+}
+
+void check(const SplineCurve& tip, const SplineCurve& rotary, const StandoffOptions& settings) {
+  require(tip.controls.rows() == 3 && rotary.controls.rows() == 2,
+          "optimise_standoff: a tip of 3 components, 2 rotaries");
+  require(rotary.knots.degree == kDegree, "optimise_standoff: quintic rotaries");
+  require(tip.knots.first() == rotary.knots.first() && tip.knots.last() == rotary.knots.last(),
+          "optimise_standoff: tip and rotaries over the same range");
+  require(settings.lower < settings.upper, "optimise_standoff: a range of the standoff");
+  require(settings.rows_per_span >= 1, "optimise_standoff: at least one place a piece");
+  require(settings.regularisation >= 0.0 && settings.pull >= 0.0,
+          "optimise_standoff: weights that are not negative");
+  for (int order = 1; order <= kLevels; ++order) {
+    require(limit_of(settings.standoff, order) > 0.0, "optimise_standoff: positive limits");
+    for (const RateLimits& limits : settings.linear)
+      require(limit_of(limits, order) > 0.0, "optimise_standoff: positive limits");
+  }
+  if (!settings.fixed_ends) return;
+  for (const double end : {settings.start, settings.end})
+    require(settings.lower <= end && end <= settings.upper, "optimise_standoff: ends in range");
+}
+
+Task task_of(const HeadGeometry& head, const SplineCurve& tip, const SplineCurve& rotary,
+             const StandoffOptions& settings) {
+  check(tip, rotary, settings);
+  Task task;
+  task.knots = rotary.knots;
+  task.middle = 0.5 * (settings.lower + settings.upper);
+  task.half = 0.5 * (settings.upper - settings.lower);
+  const auto add = [&](std::vector<Place>& places, double u, double weight) {
+    places.push_back(place_at(head, tip, rotary, u));
+    Place& place = places.back();
+    place.weight = weight;
+    place.linears.a += task.middle * place.linears.b;
+  };
+  const GaussRule& rule = gauss_rule(kGaussPoints);
+  for (int span = 0; span < task.knots.spans(); ++span) {
+    const double first = task.knots.values[span + kDegree];
+    const double length = task.knots.values[span + kDegree + 1] - first;
+    for (int g = 0; g < rule.points; ++g)
+      add(task.quadrature, first + length * rule.nodes[g], length * rule.weights[g]);
+    for (int n = 0; n < settings.rows_per_span; ++n)
+      add(task.row_places, first + length * n / settings.rows_per_span, 0.0);
+  }
+  add(task.row_places, task.knots.last(), 0.0);
+  for (const Place& place : task.quadrature)
+    task.held_jerk += place.weight * place.linears.a.col(3).squaredNorm();
+  return task;
+}
+
+/// Σ ∫ (q_i''')² du with q6 = middle + offset.
+double jerk_integral(const Task& task, const SplineCurve& offset) {
+  double sum = 0.0;
+  for (const Place& place : task.quadrature) {
+    Vec3 jerk = place.linears.a.col(3);
+    for (int s = 0; s < 4; ++s)
+      jerk += kBinomial[3][s] * offset.at(place.u, s)[0] * place.linears.b.col(3 - s);
+    sum += place.weight * jerk.squaredNorm();
+  }
+  return sum;
+}
+
+/// A constant.
+SplineCurve held_at(const SplineKnots& knots, double value) {
+  return {knots, Eigen::MatrixXd::Constant(1, knots.controls(), value)};
+}
+
+/// Weights of the piece's variables in q6 and its derivatives at a place.
+struct LocalBasis {
+  int span = 0;
+  Eigen::Matrix<double, kDegree + 1, 4> weights;  ///< column s: the s-th derivative
+};
+
+LocalBasis local_basis(const SplineLayout& layout, double u) {
+  LocalBasis basis;
+  for (int s = 0; s < 4; ++s) {
+    const LocalRow row = local_row(layout, 0, u, s);
+    basis.span = row.span;
+    basis.weights.col(s) = row.weights;
+  }
+  return basis;
+}
+
+using LinearWeights = Eigen::Matrix<double, kDegree + 1, 3>;
+
+/// Weights of the piece's variables in the derivative of that order of the linears (columns).
+LinearWeights linear_weights(const LocalBasis& basis, const Place& place, int order) {
+  LinearWeights weights = LinearWeights::Zero();
+  for (int s = 0; s <= order; ++s)
+    weights +=
+        kBinomial[order][s] * basis.weights.col(s) * place.linears.b.col(order - s).transpose();
+  return weights;
+}
+
+/// A derivative's variables are of the size of its limit, or less: of a q6 that goes from one end
+/// of its range to the other with kJerks times the jerk that the linears have with it held.
+SplineLayout layout_of(const Task& task, const RateLimits& limits) {
+  SplineLayout layout = spline_layout(task.knots, kLevels, 1);
+  const double rms = std::sqrt(task.held_jerk / task.length());
+  const double travel = std::clamp(std::cbrt(task.half / std::max(kJerks * rms, kTiny)),
+                                   task.length() / layout.spans(), task.length());
+  for (int level = 0; level <= kLevels; ++level) {
+    const double size = task.half / std::pow(travel, level);
+    layout.scale(0, level) = level == 0 ? size : std::min(limit_of(limits, level), size);
+  }
+  return layout;
+}
+
+/// What the objective is divided by.
+double objective_scale(const Task& task, const SplineLayout& layout) {
+  const double jerk = layout.scale(0, kLevels);
+  return std::max(task.held_jerk, kLeastObjective * jerk * jerk * task.length());
+}
+
+void add_objective(QuadraticProgram& qp, const Task& task, const StandoffOptions& settings) {
+  const double scale = objective_scale(task, qp.layout);
+  for (const Place& place : task.quadrature) {
+    const LocalBasis basis = local_basis(qp.layout, place.u);
+    const LinearWeights weights = linear_weights(basis, place, 3);
+    const Vec3 jerk = place.linears.a.col(3);
+    const double share = place.weight / scale;
+    qp.hessian.middleCols(basis.span * (kDegree + 1), kDegree + 1) +=
+        2.0 * share * weights * weights.transpose();
+    qp.gradient.col(basis.span) += 2.0 * share * weights * jerk;
+    qp.constant += share * jerk.squaredNorm();
+  }
+  add_derivative_cost(qp, 0, 3, 2.0 * settings.regularisation / scale);
+  add_derivative_cost(qp, 0, 0, 2.0 * settings.pull / (task.length() * task.half * task.half));
+}
+
+void fix(QuadraticProgram& qp, int level, int j, double value) {
+  const int i = qp.layout.index(0, level, j);
+  qp.lower[i] = qp.upper[i] = value / qp.layout.scale(0, level);
+}
+
+void add_bounds(QuadraticProgram& qp, const Task& task, const StandoffOptions& settings) {
+  limit_level(qp, 0, 0, task.half);
+  for (int level = 1; level <= kLevels; ++level)
+    limit_level(qp, 0, level, limit_of(settings.standoff, level));
+  const auto last = [&](int level) { return qp.layout.count(level) - 1; };
+  for (int level = 1; settings.rest_at_ends && level <= 2; ++level) {
+    fix(qp, level, 0, 0.0);
+    fix(qp, level, last(level), 0.0);
+  }
+  if (!settings.fixed_ends) return;
+  fix(qp, 0, 0, settings.start - task.middle);
+  fix(qp, 0, last(0), settings.end - task.middle);
+}
+
+/// Limits of the linears at the places, each divided by the limit.
+void add_rows(QuadraticProgram& qp, const Task& task, const StandoffOptions& settings) {
+  std::vector<NewRow> rows;
+  for (const Place& place : task.row_places) {
+    const LocalBasis basis = local_basis(qp.layout, place.u);
+    for (int order = 1; order <= 3; ++order) {
+      const LinearWeights weights = linear_weights(basis, place, order);
+      for (int i = 0; i < 3; ++i) {
+        const double limit = limit_of(settings.linear[i], order);
+        if (!std::isfinite(limit)) continue;
+        const double held = place.linears.a(i, order) / limit;
+        rows.push_back({{basis.span, weights.col(i) / limit},
+                        -1.0 - held,
+                        1.0 - held,
+                        kRowNames[i][order - 1],
+                        place.u});
+      }
+    }
+  }
+  set_rows(qp, rows);
+}
+
+QuadraticProgram programme(const Task& task, const StandoffOptions& settings) {
+  QuadraticProgram qp = empty_program(layout_of(task, settings.standoff));
+  add_objective(qp, task, settings);
+  add_bounds(qp, task, settings);
+  add_rows(qp, task, settings);
+  return qp;
+}
+
+struct RowLimit {
+  int linear = 0;
+  int order = 0;
+};
+
+/// What a row limits, by its name; nothing for a bound.
+std::optional<RowLimit> row_limit(std::string_view name) {
+  for (int i = 0; i < 3; ++i)
+    for (int order = 1; order <= 3; ++order)
+      if (name == kRowNames[i][order - 1]) return RowLimit{i, order};
+  return std::nullopt;
+}
+
+/// Every limit of the derivative l gives way by l·τ of itself; the range and the ends do not.
+Relaxation time_relaxation(const QuadraticProgram& qp, const StandoffOptions& settings) {
+  Relaxation relaxation;
+  relaxation.bound_weight = Eigen::VectorXd::Zero(qp.layout.size());
+  for (int level = 1; level <= kLevels; ++level) {
+    const double bound = limit_of(settings.standoff, level) / qp.layout.scale(0, level);
+    if (std::isfinite(bound))
+      relaxation.bound_weight.segment(qp.layout.index(0, level, 0), qp.layout.count(level))
+          .setConstant(level * bound);
+  }
+  relaxation.bound_weight =
+      (qp.lower.array() < qp.upper.array()).select(relaxation.bound_weight, 0.0).eval();
+  relaxation.row_weight.resize(qp.row_count());
+  for (int n = 0; n < qp.row_count(); ++n)
+    relaxation.row_weight[n] = row_limit(qp.row_name[n]).value().order;
+  relaxation.lower = -1.0 / kLevels;
+  return relaxation;
+}
+
+QpFeasibility ask_feasibility(QuadraticProgram qp, const StandoffOptions& settings) {
+  qp.relaxation = time_relaxation(qp, settings);
+  QpSettings solver = settings.solver;
+  solver.start = nullptr;
+  return feasibility(qp, solver);
+}
+
+/// Where the time factor lies, as far as the programmes so far say.
+struct Bracket {
+  double below = 1.0;
+  double above = std::numeric_limits<double>::infinity();
+
+  void narrow(double t, double tau) {
+    below = std::max(below, t * std::cbrt(std::max(0.0, 1.0 + 3.0 * tau)));
+    above = std::min(above, t * (1.0 + tau));
+  }
+  bool narrow_enough() const { return above <= below * (1.0 + kTimeAccuracy); }
+  /// The factor if nothing but that derivative counts.
+  double guess(double t, double tau, int derivative) const {
+    const double l = std::clamp(derivative, 1, kLevels);
+    return std::clamp(t * std::pow(std::max(0.0, 1.0 + l * tau), 1.0 / l), below, above);
+  }
+};
+
+}  // namespace
+
+StandoffResult optimise_standoff(const HeadGeometry& head, const SplineCurve& tip,
+                                 const SplineCurve& rotary, const StandoffOptions& settings) {
+  const Task task = task_of(head, tip, rotary, settings);
+  const QuadraticProgram qp = programme(task, settings);
+  StandoffResult result;
+  result.q6 = held_at(task.knots, settings.fixed_ends ? settings.start - task.middle : 0.0);
+  result.jerk_before = result.jerk_after = jerk_integral(task, result.q6);
+  result.solution = solve_qp(qp, settings.solver);
+  result.solution.objective *= objective_scale(task, qp.layout);
+  if (result.solution.status == QpStatus::optimal) {
+    result.q6.controls = controls_of(qp.layout, result.solution.x);
+    result.jerk_after = jerk_integral(task, result.q6);
+  } else {
+    result.feasibility = ask_feasibility(qp, settings);
+    if (result.feasibility.shortfall > kFeasible &&
+        result.feasibility.solution.status == QpStatus::optimal)
+      result.solution.status = QpStatus::infeasible;
+  }
+  result.q6.controls.array() += task.middle;
+  return result;
+}
+
+StandoffTimeFactor least_standoff_time(const HeadGeometry& head, const SplineCurve& tip,
+                                       const SplineCurve& rotary, const StandoffOptions& settings) {
+  const Task task = task_of(head, tip, rotary, settings);
+  StandoffTimeFactor out;
+  Bracket bracket;
+  double t = 1.0;
+  while (out.solves < kMaxSolves && !bracket.narrow_enough()) {
+    const StandoffOptions slow = slowed(settings, t);
+    const QpFeasibility answer = ask_feasibility(programme(task, slow), slow);
+    ++out.solves;
+    if (answer.solution.status != QpStatus::optimal) return out;
+    if (t == 1.0 && answer.shortfall <= kFeasible) return {true, 1.0, -1, 0, 0.0, out.solves};
+    const std::optional<RowLimit> row = row_limit(answer.name);
+    out.joint = row ? head.linear[row->linear] : head.standoff;
+    out.derivative = row ? row->order : answer.level;
+    out.place = answer.place;
+    bracket.narrow(t, answer.shortfall);
+    t = bracket.guess(t, answer.shortfall, out.derivative);
+  }
+  out.factor = bracket.above;
+  out.found = bracket.narrow_enough();
+  return out;
+}
+
+}  // namespace smoothpost

@@ -1,0 +1,22 @@
+#pragma once
+
+#include "kernels/qp/qp_solver.h"
+
+namespace smoothpost {
+
+/// Ipopt's optimum of a programme whose optimum the banded solver has found already.
+///
+/// Ipopt gets the programme with those rows only that are near active at `banded` (slack below
+/// 1e-3, or a multiplier); the others are checked at its optimum and added where they are violated,
+/// until none is. Multipliers of rows that were left out are 0, so the certificate is one of the
+/// whole programme.
+/// Above `window` control points Ipopt works window by window: outside of each window the variables
+/// keep the banded solver's values.
+/// @pre banded is a solution of qp with status optimal   @return Ipopt's; its own status when it fails
+QpSolution solve_by_hybrid(const QuadraticProgram& qp, const QpSettings& settings,
+                           const QpSolution& banded);
+
+/// Control points above which Ipopt works window by window.
+inline constexpr int kIpoptWindow = 20000;
+
+}  // namespace smoothpost

@@ -1,0 +1,71 @@
+#include "postproc/pipeline/laser_plan.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/core/units.h"
+#include "postproc/pipeline/conversion_parts.h"
+#include "postproc/pipeline/laser_stretch.h"
+
+namespace smoothpost {
+
+namespace {
+
+/// Replaces the samples of the stretches in those of the programmed path.
+class LaserPlanner {
+ public:
+  LaserPlanner(const LaserPlanInput& input, const JointPlan& base, const Progress& progress)
+      : in_(input), base_(base), progress_(progress) {}
+
+  Result<LaserPlan> run() {
+    const auto head = HeadGeometry::from(in_.pair.chain());
+    if (!head)
+      return Result<LaserPlan>::failure(diagnostic(
+          "KN150",
+          "recipe.optimise = \"jerk\" needs a head of three linear axes that carry two rotaries and "
+          "a redundant axis along the tool, and machine " + in_.machine.name +
+              " is none: set recipe.optimise = \"none\"",
+          in_.file_name));
+    LaserPlan plan;
+    std::size_t next = 0;  // first base sample that is not taken over
+    std::size_t done = 0;
+    for (const Cut& cut : in_.cuts) {
+      if (cut.omitted) continue;
+      const CuttingFrames frames(in_.reference, cut.first, cut.last, in_.part);
+      for (const StretchRange& range : stretches_of(in_.reference, cut, in_.machine.process)) {
+        StretchPlanner planner({in_, *head, frames, range}, base_.samples);
+        if (!planner.worth_it()) continue;
+        auto result = planner.run();
+        if (!result.ok()) return Result<LaserPlan>::failure(result.diagnostics());
+        take_until(planner.first_sample(), next, plan.joints.samples);
+        for (JointSample& sample : result.value().samples)
+          plan.joints.samples.push_back(std::move(sample));
+        next = planner.end_sample();
+        plan.stretches.push_back(std::move(result.value().report));
+      }
+      if (!progress_("optimise", static_cast<double>(++done) / static_cast<double>(in_.cuts.size())))
+        return Result<LaserPlan>::failure(
+            diagnostic("KN105", "cancelled while the cuts were optimised", in_.file_name));
+    }
+    take_until(base_.samples.size(), next, plan.joints.samples);
+    return Result<LaserPlan>(std::move(plan));
+  }
+
+ private:
+  void take_until(std::size_t end, std::size_t& next, std::vector<JointSample>& samples) const {
+    for (; next < end; ++next) samples.push_back(base_.samples[next]);
+  }
+
+  const LaserPlanInput& in_;
+  const JointPlan& base_;
+  const Progress& progress_;
+};
+
+}  // namespace
+
+Result<LaserPlan> plan_laser(const LaserPlanInput& input, const JointPlan& base,
+                             const Progress& progress) {
+  return LaserPlanner(input, base, progress).run();
+}
+
+}  // namespace smoothpost

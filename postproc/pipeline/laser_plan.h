@@ -1,0 +1,77 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "kernels/optimise/standoff.h"
+#include "postproc/pipeline/cuts.h"
+#include "postproc/pipeline/cutting_frame.h"
+#include "postproc/pipeline/joint_plan.h"
+
+namespace smoothpost {
+
+/// One quadratic programme that was solved for a cut, for the report.
+struct QpReport {
+  std::string name;    ///< smooth | rotary | standoff
+  std::string solver;  ///< ipopt | banded
+  std::string status;
+  double objective = 0.0;
+  int iterations = 0;
+  double kkt = 0.0;
+  double violation = 0.0;
+};
+
+/// Peaks of one joint over a planned stretch, from its spline; mm or rad and s.
+struct JointPeaks {
+  double velocity = 0.0, acceleration = 0.0, jerk = 0.0;
+  double jerk_square_integral = 0.0;                                      ///< ∫ jerk² dt
+  std::uint32_t velocity_line = 0, acceleration_line = 0, jerk_line = 0;  ///< of the input
+};
+
+/// A stretch of a cut at constant feed that was optimised as one.
+struct LaserStretch {
+  std::uint32_t first = 0, last = 0;  ///< segments of the input
+  double length = 0.0;                ///< mm, of the tip
+  double feed = 0.0;                  ///< mm/s, constant
+  double programmed_feed = 0.0;       ///< mm/s, the least on the stretch
+  std::string slowed_by;              ///< what keeps the feed below the programmed one; empty
+  std::vector<std::uint32_t> slowed_lines;
+  int control_points = 0;  ///< of the rotaries
+  int via_points = 0;
+  int passes = 0;  ///< convex passes of the rotaries
+  std::vector<QpReport> qp;
+  std::vector<JointPeaks> peaks;  ///< in joint order
+  bool normal_from_part = false;
+};
+
+struct LaserPlan {
+  JointPlan joints;
+  std::vector<LaserStretch> stretches;
+};
+
+struct LaserPlanInput {
+  const ReferencePath& reference;
+  const std::vector<Cut>& cuts;
+  const MachineDefinition& machine;
+  const RotaryPair& pair;            ///< of the output chain: tool length 0, part placed
+  const TriangleTree* part = nullptr;  ///< in W; nullptr: none
+  std::string file_name;             ///< for messages
+};
+
+/// The joints of a laser's cuts, stretch by stretch (stretches_of): the tip smoothed inside the
+/// merge and smoothing shares of its tolerance (fit_tip), the rotaries by minimum jerk inside the
+/// orientation windows (optimise_rotaries) at the largest constant feed that every joint's limits
+/// allow, the standoff by minimum jerk of the linear axes (optimise_standoff), then joint samples
+/// whose straight connection stays inside the chord share.
+///
+/// `base` are the joints of the programmed path: branches, turns and everything outside of the
+/// stretches are theirs. Where a stretch does not start or end its cut its joints are those of
+/// `base`. Limits are the machine's times tolerance.limit_share.
+/// Failures, each with input lines: KN150 a machine that is no such head; KN151 no orientation
+/// keeps the windows; KN152 the programmed feed is too fast (schedule = "programmed"); KN153 the
+/// tip cannot be smoothed inside its tolerance; KN154 a solver broke down.
+/// Cost: about 0.3 s for 160 control points with recipe.solver = "hybrid".
+Result<LaserPlan> plan_laser(const LaserPlanInput& input, const JointPlan& base,
+                             const Progress& progress);
+
+}  // namespace smoothpost

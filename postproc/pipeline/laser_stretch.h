@@ -1,0 +1,90 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "kernels/optimise/rotary_jerk.h"
+#include "kernels/optimise/tip_fit.h"
+#include "postproc/pipeline/laser_plan.h"
+#include "postproc/pipeline/laser_stations.h"
+
+namespace smoothpost {
+
+/// What one stretch of a laser's cut is planned from.
+struct StretchInput {
+  const LaserPlanInput& laser;
+  const HeadGeometry& head;
+  const CuttingFrames& frames;  ///< of its whole cut
+  StretchRange range;
+};
+
+/// Joint samples behind the start of a stretch (the first is its start), and what was found.
+struct PlannedStretch {
+  std::vector<JointSample> samples;
+  LaserStretch report;
+};
+
+/// Plans one stretch: tip, rotaries, feed, standoff, samples (plan_laser).
+class StretchPlanner {
+ public:
+  /// @param base  joint samples of the programmed path
+  StretchPlanner(StretchInput input, const std::vector<JointSample>& base);
+
+  /// Long enough for splines of its own.
+  bool worth_it() const;
+  /// Base samples [first_sample(), end_sample()) are the stretch, its start among them.
+  std::size_t first_sample() const { return first_sample_; }
+  std::size_t end_sample() const { return end_sample_; }
+  Result<PlannedStretch> run();
+
+ private:
+  struct Grid {
+    SplineKnots knots;
+    std::vector<double> s, u;  ///< length and parameter of every station
+    std::vector<CutterLocation> location;
+    std::vector<std::array<double, 2>> programmed;  ///< rotaries of the programmed axis, unwound
+  };
+
+  Grid grid(double spacing, int every) const;
+  bool fit(double spacing, int every);
+  void seed_rotaries(Grid& grid) const;
+  OrientationWindow window(const Grid& grid, std::size_t i) const;
+  RotaryProblem rotary_problem() const;
+  std::vector<RotaryVia> vias() const;
+  std::vector<std::size_t> via_stations() const;
+  void add_end_vias(std::vector<RotaryVia>& via) const;
+  StandoffOptions standoff_options(double rate) const;
+  bool standoff_is_held() const;
+  SplineCurve held_standoff() const;
+  double held_time(double rate) const;
+  std::optional<Diagnostic> find_feed();
+  std::optional<Diagnostic> settle();
+  std::optional<Diagnostic> solve_standoff(double rate);
+  Diagnostic no_orientation(const QpFeasibility& why) const;
+  Diagnostic too_fast(double factor) const;
+  Diagnostic broke(const char* what, const QpSolution& solution) const;
+  void note_slow(const std::string& why, double u);
+  JointVector joints(double u) const;
+  CutterLocation wanted(double u) const;
+  bool chord_holds(double from, double to, const JointVector& a, const JointVector& b) const;
+  void sample(PlannedStretch& out);
+  void measure(PlannedStretch& out) const;
+  void tell(const char* name, const QpSolution& solution);
+  double rate_of(double feed) const { return feed / path_.length() * grid_.knots.spans(); }
+  double length_at(double u) const { return u / grid_.knots.spans() * path_.length(); }
+
+  StretchInput in_;
+  const MachineDefinition& machine_;
+  const std::vector<JointSample>& base_;
+  StretchPath path_;
+  HeadGeometry head_;
+  std::size_t first_sample_ = 0, end_sample_ = 0;
+  RotarySettings settings_;
+  Grid grid_;
+  TipFit tip_;
+  SplineCurve rotary_, standoff_;
+  double feed_ = 0.0;  ///< mm/s
+  LaserStretch report_;
+};
+
+}  // namespace smoothpost
