@@ -4,13 +4,14 @@
 #include <cmath>
 
 #include "kernels/core/contract.h"
+#include "kernels/core/units.h"
 #include "kernels/qp/hybrid_solver.h"
 
 namespace smoothpost {
 
 namespace {
 
-constexpr double kStill = 1e-7;      // rad: rotaries of two passes are the same
+constexpr double kStill = 1e-7;  // rad: rotaries of two passes are the same
 constexpr double kSameObjective = 1e-6;
 constexpr double kHolds = 1e-9;      // a window is kept
 constexpr double kTimeShare = 1e-5;  // relative accuracy of the least time
@@ -21,19 +22,25 @@ struct HalfSpace {
   std::string_view name;
 };
 
-/// The half-spaces of a window with unit normals; the widest cone by its tangent plane towards
-/// `axis`, where it is nearer than the corners of lead and tilt.
-std::vector<HalfSpace> half_spaces(const OrientationWindow& w, const Vec3& axis) {
+/// The half-spaces of a window with unit normals. The widest cone is the pyramid inside it whose
+/// edges lie on it, where the corners of lead and tilt are outside.
+std::vector<HalfSpace> half_spaces(const OrientationWindow& w) {
+  constexpr int kSides = 16;
+  const double lead[] = {std::tan(w.lead_low), std::tan(w.lead_high)};
+  const double tilt[] = {std::tan(w.tilt_low), std::tan(w.tilt_high)};
   std::vector<HalfSpace> list;
-  list.push_back({(std::tan(w.lead_high) * w.normal - w.tangent).normalized(), "lead"});
-  list.push_back({(w.tangent - std::tan(w.lead_low) * w.normal).normalized(), "lead"});
-  list.push_back({(std::tan(w.tilt_high) * w.normal - w.binormal).normalized(), "tilt"});
-  list.push_back({(w.binormal - std::tan(w.tilt_low) * w.normal).normalized(), "tilt"});
-  const double lead = std::tan(std::max(std::abs(w.lead_low), std::abs(w.lead_high)));
-  const double tilt = std::tan(std::max(std::abs(w.tilt_low), std::abs(w.tilt_high)));
-  const Vec3 aside = axis - axis.dot(w.normal) * w.normal;
-  if (std::hypot(lead, tilt) > std::tan(w.widest) && aside.norm() > 1e-6)
-    list.push_back({std::sin(w.widest) * w.normal - std::cos(w.widest) * aside.normalized(), "gap"});
+  list.push_back({(lead[1] * w.normal - w.tangent).normalized(), "lead"});
+  list.push_back({(w.tangent - lead[0] * w.normal).normalized(), "lead"});
+  list.push_back({(tilt[1] * w.normal - w.binormal).normalized(), "tilt"});
+  list.push_back({(w.binormal - tilt[0] * w.normal).normalized(), "tilt"});
+  const double reach = std::tan(w.widest) * std::cos(kPi / kSides);
+  for (int k = 0; k < kSides; ++k) {
+    const double turn = 2.0 * kPi * (k + 0.5) / kSides;
+    const double c = std::cos(turn), s = std::sin(turn);
+    const double corner = std::max(c * lead[0], c * lead[1]) + std::max(s * tilt[0], s * tilt[1]);
+    if (corner > reach)
+      list.push_back({(reach * w.normal - c * w.tangent - s * w.binormal).normalized(), "gap"});
+  }
   return list;
 }
 
@@ -108,7 +115,8 @@ class Passes {
 
   /// `objective` is that of this pass' programme.
   bool settled(double objective) {
-    const bool same = std::abs(objective - objective_) <= kSameObjective * (1.0 + std::abs(objective));
+    const bool same =
+        std::abs(objective - objective_) <= kSameObjective * std::abs(objective) + 1e-12;
     objective_ = objective;
     return outside_ <= kHolds && (change_ <= kStill || same);
   }
@@ -142,7 +150,7 @@ class Passes {
       slope[c] = Vec3(jac.col(in_.joints[c]).head<3>()).cross(axis);
     const LocalRow first = local_row(layout, 0, w.u, 0);
     const LocalRow second = local_row(layout, 1, w.u, 0);
-    for (const HalfSpace& h : half_spaces(w, axis)) {
+    for (const HalfSpace& h : half_spaces(w)) {
       const double a = h.normal.dot(slope[0]), b = h.normal.dot(slope[1]);
       NewRow row;
       row.row = first;
@@ -155,19 +163,22 @@ class Passes {
     }
   }
 
-  // Between two vias the first derivative's control points have the sign of the step.
+  // Control points of the first derivative that reach between two vias have the sign of the step;
+  // where it turns around they are 0.
   void add_monotone(QuadraticProgram& qp) const {
+    const std::vector<double>& knots = qp.layout.knots.values;
     for (int c = 0; c < 2; ++c)
       for (int j = 0; j < qp.layout.count(1); ++j) {
-        const double u = qp.layout.place(1, j);
-        const auto behind = std::find_if(in_.via.begin(), in_.via.end(),
-                                         [u](const RotaryVia& v) { return v.u >= u; });
-        if (behind == in_.via.begin() || behind == in_.via.end()) continue;
-        const double step = behind->q[static_cast<std::size_t>(c)] -
-                            std::prev(behind)->q[static_cast<std::size_t>(c)];
+        const double first = knots[static_cast<std::size_t>(j + 1)];
+        const double last = knots[static_cast<std::size_t>(j + 1 + qp.layout.knots.degree)];
         const int k = qp.layout.index(c, 1, j);
-        if (step >= 0.0) qp.lower[k] = std::max(qp.lower[k], 0.0);
-        if (step <= 0.0) qp.upper[k] = std::min(qp.upper[k], 0.0);
+        for (std::size_t v = 1; v < in_.via.size(); ++v) {
+          if (in_.via[v].u <= first || in_.via[v - 1].u >= last) continue;
+          const double step = in_.via[v].q[static_cast<std::size_t>(c)] -
+                              in_.via[v - 1].q[static_cast<std::size_t>(c)];
+          if (step >= 0.0) qp.lower[k] = std::max(qp.lower[k], 0.0);
+          if (step <= 0.0) qp.upper[k] = std::min(qp.upper[k], 0.0);
+        }
       }
   }
 
@@ -219,6 +230,36 @@ bool usable(const QpSolution& s) {
   return s.status == QpStatus::optimal || s.certificate.violation < 1e-7;
 }
 
+/// Why a programme has no solution: `why` names the limit that a longer time would give room at, or
+/// the window that cannot be kept in any time.
+RotaryStatus verdict(QuadraticProgram qp, const QpSettings& settings, QpFeasibility& why) {
+  qp.relaxation = by_time(qp);
+  why = feasibility(qp, settings);
+  if (usable(why.solution))
+    return why.shortfall > 0.0 ? RotaryStatus::too_fast : RotaryStatus::solver_failed;
+  qp.relaxation = by_cone(qp);
+  why = feasibility(qp, settings);
+  return usable(why.solution) && why.shortfall > 1e-7 ? RotaryStatus::cone_empty
+                                                      : RotaryStatus::solver_failed;
+}
+
+/// The smoothest rotaries at a time that has room, from those of `out`; false: there are none.
+bool settle_at(RotaryProblem problem, double t, RotaryTime& out) {
+  for (RateLimits& l : problem.limits) l = slowed(l, t);
+  for (std::size_t i = 0; i < problem.windows.size(); ++i) {
+    const Eigen::VectorXd value = out.q.at(problem.windows[i].u);
+    problem.seed[i] = {value[0], value[1]};
+  }
+  RotarySettings settings;
+  settings.hybrid = false;
+  RotaryResult there = optimise_rotaries(problem, settings);
+  if (there.status != RotaryStatus::optimal) return false;
+  out.status = RotaryStatus::optimal;
+  out.q = std::move(there.q);
+  out.factor = t;
+  return true;
+}
+
 }  // namespace
 
 RateLimits slowed(const RateLimits& limits, double t) {
@@ -227,7 +268,7 @@ RateLimits slowed(const RateLimits& limits, double t) {
 
 double OrientationWindow::outside(const Vec3& axis) const {
   double worst = -1.0;
-  for (const HalfSpace& h : half_spaces(*this, axis)) worst = std::max(worst, -h.normal.dot(axis));
+  for (const HalfSpace& h : half_spaces(*this)) worst = std::max(worst, -h.normal.dot(axis));
   return worst;
 }
 
@@ -245,8 +286,8 @@ RotaryResult optimise_rotaries(const RotaryProblem& problem, const RotarySetting
       QuadraticProgram elastic = qp;
       elastic.relaxation = by_cone(qp);
       out.why = feasibility(elastic, banded);
-      out.status = usable(out.why.solution) ? RotaryStatus::too_fast : RotaryStatus::solver_failed;
-      if (!usable(out.why.solution) || problem.windows.empty()) return out;
+      out.status = RotaryStatus::too_fast;
+      if (!usable(out.why.solution) || problem.windows.empty()) break;
       out.solution = out.why.solution;
     } else {
       out.status = RotaryStatus::not_converged;
@@ -255,12 +296,15 @@ RotaryResult optimise_rotaries(const RotaryProblem& problem, const RotarySetting
     passes.follow(out.q);
     out.passes = passes.passes();
     out.outside = passes.outside();
-    if (out.status == RotaryStatus::not_converged && (problem.windows.empty() || passes.settled(out.solution.objective))) {
+    if (out.status == RotaryStatus::not_converged &&
+        (problem.windows.empty() || passes.settled(out.solution.objective))) {
       out.status = RotaryStatus::optimal;
       break;
     }
   }
-  if (out.status == RotaryStatus::not_converged && out.outside <= kHolds) out.status = RotaryStatus::optimal;
+  if (out.status == RotaryStatus::not_converged && out.outside <= kHolds)
+    out.status = RotaryStatus::optimal;
+  if (out.status == RotaryStatus::too_fast) out.status = verdict(qp, banded, out.why);
   if (out.status != RotaryStatus::optimal) return out;
   if (settings.hybrid) {
     const QpSolution last = solve_by_hybrid(qp, settings.solver, out.solution);
@@ -288,8 +332,9 @@ RotaryTime least_rotary_time(const RotaryProblem& problem, double least,
     if (!usable(answer.solution)) {
       qp.relaxation = by_cone(qp);
       out.why = feasibility(qp, settings.solver);
-      out.status = usable(out.why.solution) && out.why.shortfall > 1e-7 ? RotaryStatus::cone_empty
-                                                                        : RotaryStatus::solver_failed;
+      out.status = usable(out.why.solution) && out.why.shortfall > 1e-7
+                       ? RotaryStatus::cone_empty
+                       : RotaryStatus::solver_failed;
       if (out.status != RotaryStatus::cone_empty) return out;
       out.q = curve_of(qp, out.why.solution);
       passes.follow(out.q);
@@ -310,6 +355,10 @@ RotaryTime least_rotary_time(const RotaryProblem& problem, double least,
     }
   }
   out.factor = t * (1.0 + 3.0 * kTimeShare);
+  // Where there is time to spare the least τ is no place to stand still at: a little more is.
+  if (out.status == RotaryStatus::not_converged)
+    for (const double spare : {3.0 * kTimeShare, 1e-3, 3e-3, 1e-2})
+      if (settle_at(problem, t * (1.0 + spare), out)) break;
   return out;
 }
 

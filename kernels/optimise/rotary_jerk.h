@@ -29,52 +29,53 @@ struct RotaryVia {
 
 struct RotaryProblem {
   const ScrewChain* chain = nullptr;
-  std::array<int, 2> joints{};                ///< the two rotaries
-  JointVector held;                           ///< values of the other joints (they do not matter)
-  SplineKnots knots;                          ///< quintic, clamped
-  std::vector<OrientationWindow> windows;     ///< ascending u; empty: no cone
-  std::vector<std::array<double, 2>> seed;    ///< rotaries at every window, unwound, to start from
-  std::vector<RotaryVia> via;                 ///< ascending u
-  std::array<double, 2> lower{}, upper{};     ///< rad
-  std::array<RateLimits, 2> limits;           ///< by u; infinity: none
-  bool rest_at_ends = true;                   ///< q' = q'' = 0 at both ends
+  std::array<int, 2> joints{};              ///< the two rotaries
+  JointVector held;                         ///< values of the other joints (they do not matter)
+  SplineKnots knots;                        ///< quintic, clamped
+  std::vector<OrientationWindow> windows;   ///< ascending u; empty: no cone
+  std::vector<std::array<double, 2>> seed;  ///< rotaries at every window, unwound, to start from
+  std::vector<RotaryVia> via;               ///< ascending u
+  std::array<double, 2> lower{}, upper{};   ///< rad
+  std::array<RateLimits, 2> limits;         ///< by u; infinity: none
+  bool rest_at_ends = true;                 ///< q' = q'' = 0 at both ends
   bool monotone = false;  ///< between two vias no rotary turns back, flat where both are equal
 };
 
 struct RotarySettings {
-  QpSettings solver;        ///< of the last pass; `hybrid` below
-  bool hybrid = true;       ///< passes banded, the last programme once more by Ipopt
+  QpSettings solver;   ///< of the last pass; `hybrid` below
+  bool hybrid = true;  ///< passes banded, the last programme once more by Ipopt
   int most_passes = 12;
   double cone_margin = 1e-7;  ///< by which the half-spaces are drawn in, rad
 };
 
 enum class RotaryStatus {
   optimal,
-  cone_empty,   ///< no spline on these knots keeps the windows and vias, whatever the limits
-  too_fast,     ///< the windows can be kept, but not inside the limits
+  cone_empty,  ///< no spline on these knots keeps the windows and vias, whatever the limits
+  too_fast,    ///< the windows can be kept, but not inside the limits
   not_converged,
   solver_failed
 };
 
 struct RotaryResult {
   RotaryStatus status = RotaryStatus::solver_failed;
-  SplineCurve q;             ///< two components, rad
-  QpSolution solution;       ///< of the last pass; objective Σ ∫ (q''')² du, rad²/u⁵
+  SplineCurve q;        ///< two components, rad
+  QpSolution solution;  ///< of the last pass; objective Σ ∫ (q''')² du, rad²/u⁵
   int passes = 0;
-  double outside = 0.0;      ///< largest OrientationWindow::outside at the windows
-  QpFeasibility why;         ///< when there is no solution: which limit, where
+  double outside = 0.0;  ///< largest OrientationWindow::outside at the windows
+  QpFeasibility why;     ///< when there is no solution: which limit, where
 };
 
 /// minimise Σ_{c=1,2} ∫ (q_c''')² du over two quintic splines, under limits on the control points
 /// of the first three derivatives, position limits, via points as equations and, at every window,
 /// the orientation cone.
 ///
-/// The half-spaces (tan(high)·N − T)·O ≥ 0, (T − tan(low)·N)·O ≥ 0 (B for tilt) and the tangent
-/// plane of the widest cone are exact in O; O is linear in (q1, q2) about the last pass:
+/// The half-spaces (tan(high)·N − T)·O ≥ 0, (T − tan(low)·N)·O ≥ 0 (B for tilt) and the pyramid
+/// of 16 sides inside the widest cone are exact in O; O is linear in (q1, q2) about the last pass:
 /// O ≈ O_r + Σ (w_c × O_r)(q_c − q_r,c). Passes repeat until the windows hold to 1e-9 and the
 /// rotaries stand still to 1e-7; a pass that violates more than the one before goes half the way.
 /// Guarantees (tests): every window holds at its place; limits hold everywhere (control points);
-/// KKT of the last programme; via points exact; deterministic.
+/// KKT of the last programme; via points exact; deterministic; monotone: the control points of the
+/// first derivative that reach between two vias have the sign of the step, 0 where it turns around.
 /// Units: rad, u.   Cost: passes × about 15 iterations, linear in pieces and windows.
 /// Implements [Ding2025] Eq. (57)-(61). Differences from the paper: the printed programme has no
 /// condition between via points and turns up to 41° off there (test); via values have to be
@@ -84,15 +85,17 @@ RotaryResult optimise_rotaries(const RotaryProblem& problem, const RotarySetting
 /// By how much a stretch has to slow down so that the rotaries keep their limits, and why.
 struct RotaryTime {
   RotaryStatus status = RotaryStatus::solver_failed;
-  double factor = 1.0;   ///< t ≥ `least`: each piece has to take t times as long
-  QpFeasibility why;     ///< which limit is tight there
-  SplineCurve q;         ///< rotaries that keep the limits at the factor
+  double factor = 1.0;  ///< t ≥ `least`: each piece has to take t times as long
+  QpFeasibility why;    ///< which limit is tight there
+  SplineCurve q;        ///< rotaries that keep the limits at the factor
   int passes = 0;
 };
 
 /// The least t ≥ `least` such that optimise_rotaries() has a solution when velocity limits are
 /// multiplied by t, acceleration by t², jerk by t³ (StandoffTimeFactor has the method; here every
-/// pass moves the cone's half-spaces too).   Guarantee (test): Case 2 of paper B.
+/// pass moves the cone's half-spaces too). Where the windows do not stand still at the least time,
+/// up to 1 % more: `q` are then the smoothest rotaries at the factor.
+/// Guarantees (tests): windows and limits hold at the factor; not 2 % below it; Case 2 of paper B.
 RotaryTime least_rotary_time(const RotaryProblem& problem, double least,
                              const RotarySettings& settings = {});
 

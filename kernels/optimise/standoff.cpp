@@ -299,6 +299,13 @@ QpFeasibility ask_feasibility(QuadraticProgram qp, const StandoffOptions& settin
   return feasibility(qp, solver);
 }
 
+/// An elastic programme that rounding has kept from its full certificate still says its τ well
+/// enough.
+bool near_enough(const QpSolution& s) {
+  return s.status == QpStatus::optimal ||
+         (s.certificate.violation < 1e-7 && s.certificate.kkt() < 1e-5);
+}
+
 /// Where the time factor lies, as far as the programmes so far say.
 struct Bracket {
   double below = 1.0;
@@ -306,7 +313,7 @@ struct Bracket {
 
   void narrow(double t, double tau) {
     below = std::max(below, t * std::cbrt(std::max(0.0, 1.0 + 3.0 * tau)));
-    above = std::min(above, t * (1.0 + tau));
+    above = std::max(below, std::min(above, t * (1.0 + tau)));  // they may cross by rounding
   }
   bool narrow_enough() const { return above <= below * (1.0 + kTimeAccuracy); }
   /// The factor if nothing but that derivative counts.
@@ -350,7 +357,7 @@ StandoffTimeFactor least_standoff_time(const HeadGeometry& head, const SplineCur
     const StandoffOptions slow = slowed(settings, t);
     const QpFeasibility answer = ask_feasibility(programme(task, slow), slow);
     ++out.solves;
-    if (answer.solution.status != QpStatus::optimal) return out;
+    if (!near_enough(answer.solution)) return out;
     if (t == 1.0 && answer.shortfall <= kFeasible) return {true, 1.0, -1, 0, 0.0, out.solves};
     const std::optional<RowLimit> row = row_limit(answer.name);
     out.joint = row ? head.linear[row->linear] : head.standoff;

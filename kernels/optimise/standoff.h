@@ -48,7 +48,7 @@ struct StandoffResult {
 /// by 5 Gauss points a piece, under lower ≤ q6 ≤ upper, |q6'|, |q6''|, |q6'''| limits on control
 /// points, |q_i'|, |q_i''|, |q_i'''| limits at places of each piece, and q6' = q6'' = 0 at the
 /// ends. Convex; tip and tool axis are not touched by any q6. Guarantees (tests): golden qp_q6 of
-/// paper_b.json; limits hold on a dense grid, those of q1 … q3 within 0.5 % between the places;
+/// paper_b.json; limits hold on a dense grid, those of q1 … q3 within 1 % between the places;
 /// the tip stays to 1e-9 mm; not above the held standoff.
 /// Units: mm, rad, and u as the knots have it (unit pieces keep the numbers well conditioned).
 /// Cost: linear in the pieces, allocates.

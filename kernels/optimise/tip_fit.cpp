@@ -27,7 +27,8 @@ Eigen::MatrixXd guess(const TipFitProblem& p, const SplineLayout& layout) {
   return controls;
 }
 
-/// The programme of one coordinate for what has to be added to the guess, in units of the tolerance.
+/// The programme of one coordinate for what has to be added to the guess, in units of the
+/// tolerance.
 QuadraticProgram programme(const TipFitProblem& p, const SplineLayout& layout,
                            const Eigen::VectorXd& from, int coordinate) {
   const double box = p.tolerance / std::sqrt(3.0);
@@ -46,12 +47,11 @@ QuadraticProgram programme(const TipFitProblem& p, const SplineLayout& layout,
   for (std::size_t i = 0; i < p.u.size(); ++i) {
     NewRow row;
     row.row = local_row(layout, 0, p.u[i], 0);
-    const double miss =
-        (p.points[i][coordinate] - bspline_value(p.knots, from, p.u[i])) / box;
+    const double miss = (p.points[i][coordinate] - bspline_value(p.knots, from, p.u[i])) / box;
     const double room = i == 0 || i + 1 == p.u.size() ? 0.0 : 1.0;
     row.lower = miss - room;
     row.upper = miss + room;
-    row.row.weights *= layout.scale(0, 0) / box;
+    row.row.weights /= box;
     row.name = "tip";
     row.place = p.u[i];
     rows.push_back(std::move(row));

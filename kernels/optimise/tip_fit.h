@@ -32,7 +32,8 @@ struct TipFit {
 /// Guarantees (tests): every point within the tolerance; ends exact; points of a parabola give the
 /// parabola; rounding to 1 µm and 5 µm leaves no trace in the third derivative.
 /// Cost: three programmes of one channel, linear in pieces and points.
-/// Not in the paper (it interpolates: [Ding2025] Eq. (50)-(52), which is singular on uniform knots).
+/// Not in the paper (it interpolates: [Ding2025] Eq. (50)-(52), which is singular on uniform
+/// knots).
 TipFit fit_tip(const TipFitProblem& problem);
 
 }  // namespace smoothpost

@@ -14,6 +14,8 @@ namespace {
 constexpr double kEquationWeight = 1e5;  // 1/δ of the user's equations
 constexpr int kMostRefinements = 4;
 constexpr int kHopelessRounds = 3;
+constexpr double kHopelessMultiplier = 1e12;
+constexpr double kRefinedBelow = 1e-4;  // mean complementarity
 constexpr int kMostAccurate = 2;
 constexpr double kProximal = 1e-13;
 constexpr double kMostProximal = 1e-3;
@@ -60,7 +62,7 @@ class InteriorPoint {
     }
     out.iterations = iteration;
     fill(out);
-    out.status = done                                      ? QpStatus::optimal
+    out.status = done                                    ? QpStatus::optimal
                  : iteration == settings_.max_iterations ? QpStatus::iteration_limit
                                                          : QpStatus::failed;
     return out;
@@ -117,7 +119,8 @@ class InteriorPoint {
       Local w;
       for (int p = 0; p < M * K; ++p) w[place_[p]] = qp_.rows(p, r);
       weights_.push_back(w);
-      by_stage_[static_cast<std::size_t>(qp_.row_span[static_cast<std::size_t>(r)])].push_back(limit);
+      by_stage_[static_cast<std::size_t>(qp_.row_span[static_cast<std::size_t>(r)])].push_back(
+          limit);
     }
     first_.push_back(0);
     for (const auto& stage : by_stage_) {
@@ -146,9 +149,10 @@ class InteriorPoint {
         list.push_back(w);
         const std::vector<double> h = derivative_steps(layout.knots, level + 1);
         for (int j = spans_; j + 1 < layout.count(level); ++j) {
-          const double step = h[static_cast<std::size_t>(j)] * layout.scale(c, level + 1) /
-                              layout.scale(c, level);
-          w += step * combination[static_cast<std::size_t>(level) + 1][static_cast<std::size_t>(j - spans_)];
+          const double step =
+              h[static_cast<std::size_t>(j)] * layout.scale(c, level + 1) / layout.scale(c, level);
+          w += step * combination[static_cast<std::size_t>(level) + 1]
+                                 [static_cast<std::size_t>(j - spans_)];
           list.push_back(w);
           const int variable = layout.index(c, level, j + 1);
           if (!limited(variable)) continue;
@@ -193,10 +197,11 @@ class InteriorPoint {
     y_.assign(static_cast<std::size_t>(spans_), Local::Zero());
     dy_ = y_;
     border_ = y_;
+    fix_ = y_;
     equation_multiplier_ = Array::Zero(static_cast<Eigen::Index>(equations_.size()));
     equation_step_ = equation_multiplier_;
-    for (Array* a : {&g_, &dg_, &border_g_, &sl_, &sh_, &zl_, &zh_, &weight_, &linear_, &rpl_, &rph_,
-                     &dsl_, &dsh_, &dzl_, &dzh_, &rcl_, &rch_})
+    for (Array* a : {&g_, &dg_, &border_g_, &fix_g_, &sl_, &sh_, &zl_, &zh_, &weight_, &linear_,
+                     &rpl_, &rph_, &dsl_, &dsh_, &dzl_, &dzh_, &rcl_, &rch_})
       *a = Array::Zero(n);
   }
 
@@ -278,7 +283,8 @@ class InteriorPoint {
     Local end = Local::Zero();
     add_linear(spans_, t, end);
     const auto vector = [&](int i) {
-      Local w = with_objective ? objective_gradient_[static_cast<std::size_t>(i)] : Local(Local::Zero());
+      Local w =
+          with_objective ? objective_gradient_[static_cast<std::size_t>(i)] : Local(Local::Zero());
       add_linear(i, t, w);
       return w;
     };
@@ -293,7 +299,8 @@ class InteriorPoint {
   void start() {
     for (auto& y : y_) y.setZero();
     end_ = State::Zero();
-    if (settings_.start && settings_.start->x.size() == qp_.layout.size()) take_start(settings_.start->x);
+    if (settings_.start && settings_.start->x.size() == qp_.layout.size())
+      take_start(settings_.start->x);
     update_objective_gradient();
     values(y_, end_, g_);
     // Least squares towards the middle of every range, with the objective.
@@ -313,7 +320,8 @@ class InteriorPoint {
     }
     if (factor()) {
       solve_linear(linear_, true, dy_, dg_);
-      for (int i = 0; i < spans_; ++i) y_[static_cast<std::size_t>(i)] += dy_[static_cast<std::size_t>(i)];
+      for (int i = 0; i < spans_; ++i)
+        y_[static_cast<std::size_t>(i)] += dy_[static_cast<std::size_t>(i)];
       end_ += end_step_;
       g_ += dg_;
       update_objective_gradient();
@@ -366,7 +374,8 @@ class InteriorPoint {
   }
 
   double mu() const {
-    return ((sl_ * zl_ * has_lower_).sum() + (sh_ * zh_ * has_upper_).sum() + tau_slack_ * tau_dual_) /
+    return ((sl_ * zl_ * has_lower_).sum() + (sh_ * zh_ * has_upper_).sum() +
+            tau_slack_ * tau_dual_) /
            std::max(1.0, sides_);
   }
 
@@ -396,8 +405,11 @@ class InteriorPoint {
     const double value = std::abs(objective()) + (qp_.relaxation ? std::abs(tau_) : 0.0);
     const double gap = mu() * sides_;
     const double tolerance = settings_.tolerance;
-    // Complementary with growing multipliers, and not feasible: a proof that there is no solution.
-    if (gap <= tolerance * (1.0 + value) && primal > tolerance)
+    // Complementary or with multipliers without end, and not feasible: a proof that there is no
+    // solution.
+    const double multiplier = g_.size() > 0 ? std::max(zl_.maxCoeff(), zh_.maxCoeff()) : 0.0;
+    if (primal > tolerance &&
+        (gap <= tolerance * (1.0 + value) || multiplier > kHopelessMultiplier))
       ++hopeless_;
     else
       hopeless_ = 0;
@@ -420,15 +432,19 @@ class InteriorPoint {
   }
 
   // Direction for complementarity right sides rc: s·dz + z·ds = −rc.
-  void direction() {
+  void direction(bool refined) {
     const Array dl = zl_ / sl_, dh = zh_ / sh_;
-    linear_ = has_lower_ * (rcl_ / sl_ + dl * rpl_ - zl_) - has_upper_ * (rch_ / sh_ + dh * rph_ - zh_);
+    linear_ =
+        has_lower_ * (rcl_ / sl_ + dl * rpl_ - zl_) - has_upper_ * (rch_ / sh_ + dh * rph_ - zh_);
     double border_right = 0.0, border_own = 0.0;
     if (qp_.relaxation) {
-      border_right = -qp_.relaxation->cost + (relax_ * (has_lower_ * zl_ + has_upper_ * zh_)).sum() -
-                     (relax_ * (has_lower_ * (rcl_ / sl_ + dl * rpl_) + has_upper_ * (rch_ / sh_ + dh * rph_))).sum() +
-                     tau_dual_ - tau_rc_ / tau_slack_;
-      border_own = (relax_ * relax_ * (has_lower_ * dl + has_upper_ * dh)).sum() + tau_dual_ / tau_slack_;
+      border_right =
+          -qp_.relaxation->cost + (relax_ * (has_lower_ * zl_ + has_upper_ * zh_)).sum() -
+          (relax_ * (has_lower_ * (rcl_ / sl_ + dl * rpl_) + has_upper_ * (rch_ / sh_ + dh * rph_)))
+              .sum() +
+          tau_dual_ - tau_rc_ / tau_slack_;
+      border_own =
+          (relax_ * relax_ * (has_lower_ * dl + has_upper_ * dh)).sum() + tau_dual_ / tau_slack_;
     }
     equation_step_.setZero();
     const Array fixed = linear_;
@@ -451,11 +467,42 @@ class InteriorPoint {
       }
       if (worst < 1e-3 * settings_.tolerance || round == kMostRefinements) break;
     }
+    if (refined) refine(dl, dh);
+    slack_steps();
+  }
+
+  void slack_steps() {
     dsl_ = has_lower_ * (dg_ + relax_ * dtau_ + rpl_);
     dsh_ = has_upper_ * (-dg_ + relax_ * dtau_ + rph_);
     dzl_ = has_lower_ * (-rcl_ - zl_ * dsl_) / sl_;
     dzh_ = has_upper_ * (-rch_ - zh_ * dsh_) / sh_;
     if (qp_.relaxation) dtau_dual_ = (-tau_rc_ - tau_dual_ * dtau_) / tau_slack_;
+  }
+
+  // Late weights are stiff and leave a gradient of the Lagrangian by rounding: solved for once
+  // more.
+  void refine(const Array& dl, const Array& dh) {
+    Array t = linear_ + weight_ * dg_ + relax_ * (has_lower_ * dl - has_upper_ * dh) * dtau_;
+    for (std::size_t e = 0; e < equations_.size(); ++e) {
+      const Eigen::Index at = static_cast<Eigen::Index>(e);
+      t[equations_[e]] = equation_multiplier_[at] + equation_step_[at];
+    }
+    Local end = Local::Zero();
+    add_linear(spans_, t, end);
+    const auto vector = [&](int i) {
+      const std::size_t at = static_cast<std::size_t>(i);
+      Local w = objective_gradient_[at] + hessian_[at] * dy_[at];
+      add_linear(i, t, w);
+      return w;
+    };
+    const auto take = [&](int i, const Local& y) { fix_[static_cast<std::size_t>(i)] = y; };
+    const State x = recursion_.solve(end.template head<kStates>(), vector, take);
+    values(fix_, x, fix_g_);
+    for (std::size_t i = 0; i < dy_.size(); ++i) dy_[i] += fix_[i];
+    end_step_ += x;
+    dg_ += fix_g_;
+    for (std::size_t e = 0; e < equations_.size(); ++e)
+      equation_step_[static_cast<Eigen::Index>(e)] += kEquationWeight * fix_g_[equations_[e]];
   }
 
   void eliminate_tau(double right, double own, const Array& dl, const Array& dh) {
@@ -483,9 +530,9 @@ class InteriorPoint {
   }
 
   double step_to_boundary() const {
-    double alpha = std::min(
-        {largest_step(sl_, dsl_, has_lower_), largest_step(sh_, dsh_, has_upper_),
-         largest_step(zl_, dzl_, has_lower_), largest_step(zh_, dzh_, has_upper_)});
+    double alpha =
+        std::min({largest_step(sl_, dsl_, has_lower_), largest_step(sh_, dsh_, has_upper_),
+                  largest_step(zl_, dzl_, has_lower_), largest_step(zh_, dzh_, has_upper_)});
     if (qp_.relaxation) {
       if (dtau_ < 0.0) alpha = std::min(alpha, -tau_slack_ / dtau_);
       if (dtau_dual_ < 0.0) alpha = std::min(alpha, -tau_dual_ / dtau_dual_);
@@ -503,7 +550,7 @@ class InteriorPoint {
     tau_rc_ = tau_slack_ * tau_dual_;
     double sigma = 0.0;
     if (sides_ > 0.0) {
-      direction();
+      direction(false);
       const double alpha = step_to_boundary();
       const double after = (((sl_ + alpha * dsl_) * (zl_ + alpha * dzl_) * has_lower_).sum() +
                             ((sh_ + alpha * dsh_) * (zh_ + alpha * dzh_) * has_upper_).sum() +
@@ -515,7 +562,7 @@ class InteriorPoint {
       rch_ = sh_ * zh_ + dsh_ * dzh_ - target;
       tau_rc_ = tau_slack_ * tau_dual_ + dtau_ * dtau_dual_ - target;
     }
-    direction();
+    direction(now < kRefinedBelow);
     if (!dg_.isFinite().all() || !std::isfinite(dtau_)) return false;
     const double reach = step_to_boundary();
     const double alpha = reach >= 1.0 ? 1.0 : std::max(kBoundaryShare, 1.0 - now) * reach;
@@ -595,10 +642,10 @@ class InteriorPoint {
   std::vector<bool> equal_;
   std::vector<int> equations_;
   Array lower_, upper_, relax_, has_lower_, has_upper_;
-  Array g_, dg_, border_g_, sl_, sh_, zl_, zh_, weight_, linear_, rpl_, rph_;
+  Array g_, dg_, border_g_, fix_g_, sl_, sh_, zl_, zh_, weight_, linear_, rpl_, rph_;
   Array dsl_, dsh_, dzl_, dzh_, rcl_, rch_;
   Array equation_multiplier_, equation_step_;
-  std::vector<Local> y_, dy_, border_;
+  std::vector<Local> y_, dy_, border_, fix_;
   State end_, end_step_, border_end_;
   bool border_ready_ = false;
   int hopeless_ = 0;

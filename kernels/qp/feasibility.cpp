@@ -62,8 +62,8 @@ QpFeasibility feasibility(const QuadraticProgram& qp, const QpSettings& settings
   QpFeasibility out;
   out.solution = solve_by_banded(elastic, s);
   out.shortfall = out.solution.tau;
-  const bool solved = out.solution.status == QpStatus::optimal ||
-                      out.solution.certificate.violation < 1e-7;
+  const bool solved =
+      out.solution.status == QpStatus::optimal || out.solution.certificate.violation < 1e-7;
   out.feasible = solved && out.shortfall <= s.tolerance;
   name_limit(elastic, out);
   return out;

@@ -12,6 +12,7 @@ constexpr double kNear = 1e-3;      // slack of a row that is kept
 constexpr double kWeighty = 1e-7;   // multiplier of a row that is kept
 constexpr double kViolated = 1e-9;  // a row that was left out and has to be added
 constexpr int kMostRounds = 6;
+constexpr double kAccurate = 100.0;  // certificate of an optimum, in tolerances
 
 /// The programme with the rows of `kept` alone, and which rows those are.
 QuadraticProgram with_rows(const QuadraticProgram& qp, const std::vector<bool>& kept,
@@ -97,6 +98,7 @@ QpSolution solve_near(const QuadraticProgram& qp, const QpSettings& settings,
     if (!added) break;
   }
   out.certificate = certify(qp, out);
+  if (out.certificate.kkt() > kAccurate * settings.tolerance) out.status = QpStatus::failed;
   return out;
 }
 

@@ -10,13 +10,9 @@ namespace smoothpost {
 /// 1e-3, or a multiplier); the others are checked at its optimum and added where they are violated,
 /// until none is. Multipliers of rows that were left out are 0, so the certificate is one of the
 /// whole programme.
-/// Above `window` control points Ipopt works window by window: outside of each window the variables
-/// keep the banded solver's values.
-/// @pre banded is a solution of qp with status optimal   @return Ipopt's; its own status when it fails
+/// @pre banded is a solution of qp with status optimal   @return Ipopt's; its own status when it
+/// fails
 QpSolution solve_by_hybrid(const QuadraticProgram& qp, const QpSettings& settings,
                            const QpSolution& banded);
-
-/// Control points above which Ipopt works window by window.
-inline constexpr int kIpoptWindow = 20000;
 
 }  // namespace smoothpost

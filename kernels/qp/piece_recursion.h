@@ -1,9 +1,8 @@
 #pragma once
 
-#include <vector>
-
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <vector>
 
 #include "kernels/qp/quadratic_program.h"
 

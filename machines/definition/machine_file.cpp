@@ -72,8 +72,7 @@ class Reader {
     machine.standoff = read_standoff(root_.table("standoff", "[standoff]"), machine.axes);
     machine.links = read_links(root_.table("links", "[links]"), machine.axes);
     machine.recipe = read_recipe(root_.table("recipe", "[recipe]"));
-    machine.tolerance =
-        read_tolerance(root_.table("tolerance", "[tolerance]"), machine.recipe.smoothing != "none");
+    machine.tolerance = read_tolerance(root_.table("tolerance", "[tolerance]"), machine.recipe);
     machine.dialect = read_dialect(root_.table("dialect", "[dialect]"), machine.cycle);
     check_axes(machine.axes, items, machine.dialect.name, problems_);
     TableReader process = root_.table("process", "[process]");

@@ -24,8 +24,8 @@ Body read_body(const TomlValue& item, const std::vector<AxisDefinition>& axes, P
 CycleSettings read_cycle(TableReader reader);
 StandoffSettings read_standoff(TableReader reader, const std::vector<AxisDefinition>& axes);
 LinkSettings read_links(TableReader reader, const std::vector<AxisDefinition>& axes);
-/// `smooths`: the recipe smooths, so that merging and smoothing have shares of their own.
-ToleranceSettings read_tolerance(TableReader reader, bool smooths);
+/// The default shares of the tolerances follow from what the recipe does.
+ToleranceSettings read_tolerance(TableReader reader, const RecipeSettings& recipe);
 RecipeSettings read_recipe(TableReader reader);
 DialectSettings read_dialect(TableReader reader, const CycleSettings& cycle);
 

@@ -215,9 +215,13 @@ LinkSettings read_links(TableReader reader, const std::vector<AxisDefinition>& a
 
 namespace {
 
-ToleranceBudget read_budget(TableReader reader, bool smooths) {
+// What a recipe does not do has no share of the tolerances; an optimised cut is on exact path.
+ToleranceBudget read_budget(TableReader reader, const RecipeSettings& recipe) {
   ToleranceBudget budget;
-  if (!smooths) budget = {0.0, 0.0, 0.65, 0.05, 0.30};
+  if (recipe.optimise == "jerk")
+    budget = {0.0, 0.25, 0.65, 0.10, 0.0};
+  else if (recipe.smoothing == "none")
+    budget = {0.0, 0.0, 0.65, 0.05, 0.30};
   const auto share = [&](std::string_view key, double fallback) {
     return reader.number_or(key, fallback, Bound::not_negative);
   };
@@ -239,7 +243,7 @@ ToleranceBudget read_budget(TableReader reader, bool smooths) {
 
 }  // namespace
 
-ToleranceSettings read_tolerance(TableReader reader, bool smooths) {
+ToleranceSettings read_tolerance(TableReader reader, const RecipeSettings& recipe) {
   ToleranceSettings tolerance;
   tolerance.tip = reader.number_or("tip_mm", 0.01, Bound::positive);
   tolerance.axis = radians_or(reader, "axis_deg", 0.05, Bound::positive);
@@ -253,7 +257,7 @@ ToleranceSettings read_tolerance(TableReader reader, bool smooths) {
     reader.error("MF108",
                  "limit_share is " + to_text(tolerance.limit_share) + " and has to be at most 1",
                  "limit_share");
-  tolerance.budget = read_budget(reader.table("budget", "[tolerance.budget]"), smooths);
+  tolerance.budget = read_budget(reader.table("budget", "[tolerance.budget]"), recipe);
   reader.finish();
   return tolerance;
 }

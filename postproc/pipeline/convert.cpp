@@ -11,6 +11,7 @@
 #include "postproc/pipeline/controller_blending.h"
 #include "postproc/pipeline/conversion_parts.h"
 #include "postproc/pipeline/joint_plan.h"
+#include "postproc/pipeline/laser_plan.h"
 #include "postproc/pipeline/machine_program.h"
 #include "postproc/pipeline/recipe_check.h"
 #include "postproc/pipeline/registry.h"
@@ -132,7 +133,8 @@ class Converter {
 
   SmoothedPath smoothed() {
     const auto& r = in_.machine.recipe;
-    if (r.smoothing == "none") return SmoothedPath(reference_);
+    // An optimised cut has its corners rounded by its own splines (fit_tip).
+    if (r.smoothing == "none" || optimises()) return SmoothedPath(reference_);
     SmoothingSettings s = smoothing_settings();
     if (r.shape == "tuned") tune(s);
     return SmoothedPath(reference_, cuts_, s);
@@ -343,9 +345,52 @@ class Converter {
   Result<JointPlan> plan_with(const JointPlanSettings& settings) {
     smoothed_.emplace(smoothed());
     watch_.lap("smooth");
-    if (const RotaryPair* pair = inverse_->rotary_pair())
-      return plan_joints(*smoothed_, *pair, settings, progress_);
+    if (const RotaryPair* pair = inverse_->rotary_pair()) {
+      auto planned = plan_joints(*smoothed_, *pair, settings, progress_);
+      if (!optimises() || !planned.ok() || !planned.value().splits.empty()) return planned;
+      return optimised(std::move(planned.value()), *pair);
+    }
     return plan_arm(*smoothed_, *inverse_->six_r(), settings, progress_);
+  }
+
+  bool optimises() const {
+    return in_.machine.recipe.optimise == "jerk" && in_.machine.recipe.kind == "laser";
+  }
+
+  Result<JointPlan> optimised(JointPlan base, const RotaryPair& pair) {
+    watch_.lap("kinematics");
+    LaserPlanInput laser{
+        reference_,    cuts_, in_.machine, pair, part_ && part_->ok() ? &part_->tree() : nullptr,
+        in_.input_name};
+    auto result = plan_laser(laser, base, progress_);
+    watch_.lap("optimise");
+    if (!result.ok()) return Result<JointPlan>::failure(result.diagnostics());
+    out_.stretches = std::move(result.value().stretches);
+    const Diagnostics warnings = result.diagnostics();
+    tell_stretches();
+    return Result<JointPlan>(std::move(result.value().joints), warnings);
+  }
+
+  // What was slowed down, and what the standoff may not do.
+  void tell_stretches() {
+    const auto note = [this](const char* code, std::string text, std::uint32_t line) {
+      out_.diagnostics.push_back(
+          diagnostic(code, std::move(text), in_.input_name, static_cast<int>(line)));
+      out_.diagnostics.back().severity = Severity::note;
+    };
+    for (const LaserStretch& stretch : out_.stretches)
+      if (!stretch.slowed_by.empty())
+        note("KN155",
+             "cut at " + number(stretch.feed * kSecondsPerMinute) + " mm/min instead of " +
+                 number(stretch.programmed_feed * kSecondsPerMinute) + " for " + stretch.slowed_by,
+             stretch.slowed_lines.empty() ? 0 : stretch.slowed_lines.front());
+    if (in_.machine.standoff.following == Following::exclusive &&
+        !in_.machine.standoff.axis.empty())
+      note("KN156",
+           "axis " + in_.machine.standoff.axis +
+               " belongs to the height follower (standoff.following = \"exclusive\"): it is held, "
+               "not optimised",
+           0);
   }
 
   void split(const std::vector<SplitPlace>& places) {

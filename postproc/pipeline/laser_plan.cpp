@@ -6,6 +6,7 @@
 #include "kernels/core/units.h"
 #include "postproc/pipeline/conversion_parts.h"
 #include "postproc/pipeline/laser_stretch.h"
+#include "postproc/pipeline/orientation_check.h"
 
 namespace smoothpost {
 
@@ -20,13 +21,15 @@ class LaserPlanner {
   Result<LaserPlan> run() {
     const auto head = HeadGeometry::from(in_.pair.chain());
     if (!head)
-      return Result<LaserPlan>::failure(diagnostic(
-          "KN150",
-          "recipe.optimise = \"jerk\" needs a head of three linear axes that carry two rotaries and "
-          "a redundant axis along the tool, and machine " + in_.machine.name +
-              " is none: set recipe.optimise = \"none\"",
-          in_.file_name));
+      return Result<LaserPlan>::failure(diagnostic("KN150",
+                                                   "recipe.optimise = \"jerk\" needs a head of "
+                                                   "three linear axes that carry two rotaries and "
+                                                   "a redundant axis along the tool, and machine " +
+                                                       in_.machine.name +
+                                                       " is none: set recipe.optimise = \"none\"",
+                                                   in_.file_name));
     LaserPlan plan;
+    Diagnostics warnings;
     std::size_t next = 0;  // first base sample that is not taken over
     std::size_t done = 0;
     for (const Cut& cut : in_.cuts) {
@@ -36,22 +39,45 @@ class LaserPlanner {
         StretchPlanner planner({in_, *head, frames, range}, base_.samples);
         if (!planner.worth_it()) continue;
         auto result = planner.run();
-        if (!result.ok()) return Result<LaserPlan>::failure(result.diagnostics());
+        if (!result.ok()) {
+          Diagnostics problems = result.diagnostics();
+          if (!goes_on(problems)) return Result<LaserPlan>::failure(std::move(problems));
+          append(warnings, problems);
+          continue;
+        }
         take_until(planner.first_sample(), next, plan.joints.samples);
-        for (JointSample& sample : result.value().samples)
-          plan.joints.samples.push_back(std::move(sample));
+        // Where a stretch went before, its end is the start of this one.
+        auto& samples = result.value().samples;
+        const std::ptrdiff_t from = next > planner.first_sample() ? 1 : 0;
+        plan.joints.samples.insert(plan.joints.samples.end(), samples.begin() + from,
+                                   samples.end());
         next = planner.end_sample();
         plan.stretches.push_back(std::move(result.value().report));
       }
-      if (!progress_("optimise", static_cast<double>(++done) / static_cast<double>(in_.cuts.size())))
+      if (!progress_("optimise",
+                     static_cast<double>(++done) / static_cast<double>(in_.cuts.size())))
         return Result<LaserPlan>::failure(
             diagnostic("KN105", "cancelled while the cuts were optimised", in_.file_name));
     }
     take_until(base_.samples.size(), next, plan.joints.samples);
-    return Result<LaserPlan>(std::move(plan));
+    return Result<LaserPlan>(std::move(plan), std::move(warnings));
   }
 
  private:
+  // A stretch that cannot be optimised keeps the joints of the programmed path, and that is said;
+  // where the orientation was freed for it, or the feed is not to change, there is no such way.
+  bool goes_on(Diagnostics& problems) const {
+    for (Diagnostic& d : problems) {
+      const bool kept = !orientation_is_free(in_.machine);
+      if (!(d.code == "KN153" || d.code == "KN154" || (d.code == "KN151" && kept))) return false;
+      d.severity = Severity::warning;
+      d.text +=
+          ". This stretch keeps the joints of the programmed path: nothing is planned of its "
+          "accelerations and jerks";
+    }
+    return true;
+  }
+
   void take_until(std::size_t end, std::size_t& next, std::vector<JointSample>& samples) const {
     for (; next < end; ++next) samples.push_back(base_.samples[next]);
   }

@@ -53,9 +53,9 @@ struct LaserPlanInput {
   const ReferencePath& reference;
   const std::vector<Cut>& cuts;
   const MachineDefinition& machine;
-  const RotaryPair& pair;            ///< of the output chain: tool length 0, part placed
+  const RotaryPair& pair;              ///< of the output chain: tool length 0, part placed
   const TriangleTree* part = nullptr;  ///< in W; nullptr: none
-  std::string file_name;             ///< for messages
+  std::string file_name;               ///< for messages
 };
 
 /// The joints of a laser's cuts, stretch by stretch (stretches_of): the tip smoothed inside the

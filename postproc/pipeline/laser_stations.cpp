@@ -28,7 +28,8 @@ bool turns_corner(const ReferencePath& reference, std::uint32_t k) {
 }
 
 /// The machine stands at the end of segment k.
-std::vector<bool> stops(const ReferencePath& reference, const Cut& cut, const ProcessTable& process) {
+std::vector<bool> stops(const ReferencePath& reference, const Cut& cut,
+                        const ProcessTable& process) {
   std::vector<bool> stop(cut.last + 2, false);
   for (const PathEvent& e : reference.path().events) {
     if (e.point < cut.first || e.point >= cut.last) continue;
@@ -83,8 +84,7 @@ PathPlace StretchPath::place(double s) const {
   const std::size_t i = static_cast<std::size_t>(above - starts_.begin()) - 1;
   const double share = (s - starts_[i]) / (starts_[i + 1] - starts_[i]);
   const double end = 1.0 - 1e-9;
-  return {range_.first + static_cast<std::uint32_t>(i),
-          share >= end ? 1.0 : std::max(0.0, share)};
+  return {range_.first + static_cast<std::uint32_t>(i), share >= end ? 1.0 : std::max(0.0, share)};
 }
 
 std::uint32_t StretchPath::line(double s) const {

@@ -48,6 +48,7 @@ class StretchPlanner {
   Grid grid(double spacing, int every) const;
   bool fit(double spacing, int every);
   void seed_rotaries(Grid& grid) const;
+  double normal_step(const Grid& grid, std::size_t i, const Vec3& normal) const;
   OrientationWindow window(const Grid& grid, std::size_t i) const;
   RotaryProblem rotary_problem() const;
   std::vector<RotaryVia> vias() const;
@@ -60,6 +61,8 @@ class StretchPlanner {
   std::optional<Diagnostic> find_feed();
   std::optional<Diagnostic> settle();
   std::optional<Diagnostic> solve_standoff(double rate);
+  bool keeps_to_input() const;
+  Diagnostic not_smooth() const;
   Diagnostic no_orientation(const QpFeasibility& why) const;
   Diagnostic too_fast(double factor) const;
   Diagnostic broke(const char* what, const QpSolution& solution) const;

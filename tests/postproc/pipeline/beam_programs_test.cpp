@@ -142,6 +142,10 @@ MachineDefinition siemens(const char* mode) {
   MachineDefinition machine = shipped_machine("laser_5p1");
   machine.dialect.name = "siemens_840d";
   machine.dialect.mode = mode;
+  if (machine.dialect.mode == "tcp") {  // the control has the joints there, not we
+    machine.recipe.optimise = "none";
+    machine.recipe.orientation = machine.recipe.schedule = "programmed";
+  }
   machine.dialect.start = {};
   machine.dialect.end = {"M30"};
   machine.links.rapid = RapidMotion::independent;

@@ -240,6 +240,8 @@ TEST_CASE("verify: a beam that is not where the input has it is found", "[postpr
   auto in = prepare(kLaserHead + "G0 Z1\nM62 P0\nG1 X10 F1000\nM63 P0\n" + kLaserEnd, "laser_5p1",
                     "laser_5p1");
   in.placement = at(700, 600, 1000);
+  in.machine.recipe.optimise = "none";  // one block for the whole cut
+  in.machine.recipe.orientation = in.machine.recipe.schedule = "programmed";
   const Conversion c = convert(in, false, {});
   REQUIRE(c.verdict == Verdict::certified);
   const ToolPath cut_path = with_links(in.input.path);

@@ -224,7 +224,7 @@ TEST_CASE("orientation_check: a standoff that moves the tip is found", "[postpro
   held.off_along_axis = 0.008;
   CHECK(get(held.checks(), "standoff_deviation").value == Approx(0.008).epsilon(1e-6));
   CHECK(get(held.checks(), "standoff_deviation").ok);
-  held.off_along_axis = -0.012;
+  held.off_along_axis = -0.022;
   CHECK_FALSE(get(held.checks(), "standoff_deviation").ok);
   held.off_along_axis = 0.0;
   held.machine.standoff.axis.clear();
