@@ -17,7 +17,8 @@ namespace {
 constexpr double kReserve = 5.0;         // mm of the standoff's range at either end
 constexpr double kTipTolerance = 0.005;  // mm
 constexpr double kCycle = 0.004;         // s
-constexpr std::array<double, 2> kLooseJerk = {2000.0, 30000.0};  // rad/s³
+// Of cone, of via points with cone, of monotone; rad/s³.
+constexpr std::array<double, 3> kLooseJerk = {2000.0, 30000.0, 300000.0};
 constexpr int kLocationsPerKnot = 4;
 
 ChainJoint joint(JointKind kind, const Vec3& direction, double lower, double upper) {
@@ -244,10 +245,15 @@ RotaryProblem Study::problem_for(const Request& request) const {
   if (request.method != Method::cone) problem.via = via_points(request);
   if (request.limits)
     problem.limits.fill(by_piece(kRotaryLimits, rate(request.feed)));
-  else if (cone)  // far above the optimum's peak: it scales the programme, and is never reached
+  else if (cone || problem.monotone)  // far above the optimum's peak: it scales the programme, and
+                                      // is never reached
     for (RateLimits& l : problem.limits)
-      l.jerk =
-          by_piece({1.0, 1.0, kLooseJerk[problem.via.empty() ? 0 : 1]}, rate(request.feed)).jerk;
+      l.jerk = by_piece({1.0, 1.0,
+                         kLooseJerk[problem.monotone      ? 2
+                                    : problem.via.empty() ? 0
+                                                          : 1]},
+                        rate(request.feed))
+                   .jerk;
   return problem;
 }
 

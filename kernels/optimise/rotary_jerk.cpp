@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <tuple>
+#include <utility>
 
 #include "kernels/core/contract.h"
 #include "kernels/core/units.h"
@@ -278,9 +281,15 @@ RotaryResult optimise_rotaries(const RotaryProblem& problem, const RotarySetting
   QpSettings banded = settings.solver;
   if (settings.hybrid) banded.solver = QpSolver::banded;
   QuadraticProgram qp;
+  // The last pass that keeps every window: the answer when a later one has none.
+  std::optional<std::pair<QuadraticProgram, RotaryResult>> kept;
   for (int pass = 0; pass < settings.most_passes; ++pass) {
     qp = passes.programme(1.0, scale_of(problem, 1.0));
     out.solution = solve_qp(qp, banded);
+    if (out.solution.status != QpStatus::optimal && kept) {
+      std::tie(qp, out) = std::move(*kept);
+      break;
+    }
     if (out.solution.status != QpStatus::optimal) {
       // Windows may be out of reach of the linear model: nearer by the elastic form, then again.
       QuadraticProgram elastic = qp;
@@ -296,11 +305,12 @@ RotaryResult optimise_rotaries(const RotaryProblem& problem, const RotarySetting
     passes.follow(out.q);
     out.passes = passes.passes();
     out.outside = passes.outside();
-    if (out.status == RotaryStatus::not_converged &&
-        (problem.windows.empty() || passes.settled(out.solution.objective))) {
+    if (out.status != RotaryStatus::not_converged) continue;
+    if (problem.windows.empty() || passes.settled(out.solution.objective)) {
       out.status = RotaryStatus::optimal;
       break;
     }
+    if (out.outside <= kHolds) kept.emplace(qp, out);
   }
   if (out.status == RotaryStatus::not_converged && out.outside <= kHolds)
     out.status = RotaryStatus::optimal;
