@@ -219,7 +219,7 @@ namespace {
 ToleranceBudget read_budget(TableReader reader, const RecipeSettings& recipe) {
   ToleranceBudget budget;
   if (recipe.optimise == "jerk")
-    budget = {0.0, 0.25, 0.65, 0.10, 0.0};
+    budget = {0.0, 0.40, 0.50, 0.10, 0.0};
   else if (recipe.smoothing == "none")
     budget = {0.0, 0.0, 0.65, 0.05, 0.30};
   const auto share = [&](std::string_view key, double fallback) {

@@ -11,6 +11,7 @@ namespace smoothpost {
 
 namespace {
 
+constexpr double kDense = 0.25;       // of the stations' distance: nearer segment ends are passed
 constexpr int kLeastPieces = 6;       // of a stretch that is worth splines of its own
 constexpr double kBackOff = 1.003;    // of the least time: at it the programmes have one point
 constexpr double kSlower = 1.01;      // when rotaries and standoff do not agree on a feed
@@ -151,7 +152,8 @@ Diagnostic StretchPlanner::not_smooth() const {
 // At every point of the input and in the middles between the stations.
 bool StretchPlanner::keeps_to_input() const {
   const auto& t = machine_.tolerance;
-  const double share = 1.0 - t.budget.chord - t.budget.rounding;
+  // What chord_holds() leaves.
+  const double share = 1.0 - 0.85 * t.budget.chord - t.budget.rounding;
   const bool kept = !orientation_is_free(machine_);
   std::vector<double> places;
   for (std::uint32_t k = in_.range.first; k <= in_.range.last; ++k)
@@ -172,15 +174,23 @@ bool StretchPlanner::keeps_to_input() const {
 
 StretchPlanner::Grid StretchPlanner::grid(double spacing, int every) const {
   Grid g;
-  const int steps =
-      std::max(kLeastPieces, static_cast<int>(std::ceil(path_.length() / spacing - 1e-6)));
-  const int spans = std::max(kLeastPieces, (steps + every - 1) / every);
+  const double pieces = std::ceil(path_.length() / (spacing * every) - 1e-6);
+  const int spans = std::max(kLeastPieces, static_cast<int>(pieces));
   g.knots = clamped_knots(5, spans);
-  for (int i = 0; i <= steps; ++i) {
-    const double share = static_cast<double>(i) / steps;
-    g.s.push_back(share * path_.length());
-    g.u.push_back(share * spans);
-    const PathPlace at = path_.place(g.s.back());
+  // The ends of the input's segments, as far as they are not too dense, and places between.
+  double from = 0.0;
+  g.s.push_back(0.0);
+  for (std::uint32_t k = in_.range.first; k <= in_.range.last; ++k) {
+    const double to = path_.end_of(k);
+    if (to - from < kDense * spacing && k < in_.range.last) continue;
+    const int parts = std::max(1, static_cast<int>(std::ceil((to - from) / spacing - 1e-6)));
+    for (int j = 1; j <= parts; ++j)
+      g.s.push_back(j == parts ? to : from + (to - from) * j / parts);
+    from = to;
+  }
+  for (const double s : g.s) {
+    g.u.push_back(std::min<double>(spans, s / path_.length() * spans));
+    const PathPlace at = path_.place(s);
     g.location.push_back(in_.laser.reference.at(at.segment, at.s));
   }
   return g;
@@ -188,6 +198,7 @@ StretchPlanner::Grid StretchPlanner::grid(double spacing, int every) const {
 
 bool StretchPlanner::fit(double spacing, int every) {
   grid_ = grid(spacing, every);
+  near_.reset();
   TipFitProblem p;
   p.knots = grid_.knots;
   p.u = grid_.u;
@@ -292,11 +303,18 @@ RotaryProblem StretchPlanner::rotary_problem() const {
   if (mode == "via" || mode == "monotone") {
     p.via = vias();
   } else {
-    // At every other station: the cutter locations' own distance.
+    // As far apart as the cutter locations.
+    double last = -INFINITY;
     for (std::size_t i = 0; i < grid_.u.size(); ++i) {
-      if (i % 2 == 1 && i + 1 < grid_.u.size()) continue;
+      if (grid_.s[i] - last < 0.9 * path_.spacing() && i + 1 < grid_.u.size()) continue;
+      last = grid_.s[i];
       p.windows.push_back(window(grid_, i));
-      p.seed.push_back(grid_.programmed[i]);
+      if (near_) {
+        const Eigen::VectorXd q = near_->at(grid_.u[i]);
+        p.seed.push_back({q[0], q[1]});
+      } else {
+        p.seed.push_back(grid_.programmed[i]);
+      }
     }
     add_end_vias(p.via);
   }
@@ -416,6 +434,7 @@ std::optional<Diagnostic> StretchPlanner::find_feed() {
   const RotaryTime time = least_rotary_time(rotary_problem(), 1.0, settings_);
   if (time.status == RotaryStatus::cone_empty) return no_orientation(time.why);
   if (time.status != RotaryStatus::optimal) return broke("rotary", time.why.solution);
+  near_ = time.q;
   if (time.factor > 1.0 + 1e-4) {
     const int joint = rotary_problem().joints[static_cast<std::size_t>(time.why.channel)];
     note_slow(
@@ -440,7 +459,7 @@ std::optional<Diagnostic> StretchPlanner::settle() {
       feed_ /= kSlower;
       continue;
     }
-    rotary_ = rough.q;
+    near_ = rotary_ = rough.q;
     double factor = 0.0;
     int joint = -1, derivative = 0;
     double place = 0.0;

@@ -86,7 +86,8 @@ class StretchPlanner {
   Grid grid_;
   TipFit tip_;
   SplineCurve rotary_, standoff_;
-  double feed_ = 0.0;  ///< mm/s
+  std::optional<SplineCurve> near_;  ///< rotaries that were found before, to start from
+  double feed_ = 0.0;                ///< mm/s
   LaserStretch report_;
 };
 
