@@ -377,7 +377,7 @@ std::vector<std::size_t> StretchPlanner::via_stations() const {
   // out.
   std::vector<std::size_t> kept;
   for (const std::size_t i : list)
-    if (kept.empty() || grid_.u[i] - grid_.u[kept.back()] >= 2.0) kept.push_back(i);
+    if (kept.empty() || grid_.u[i] - grid_.u[kept.back()] >= 2.0 * grid_.knots.degree) kept.push_back(i);
   kept.back() = grid_.s.size() - 1;
   return kept;
 }
