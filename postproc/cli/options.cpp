@@ -88,7 +88,7 @@ void add_convert(CLI::App& app, CommandLine& l) {
   c->add_option("--tilt", l.tilt, "the same across the cut, deg; both default to 0: kept");
   c->add_option("--smoothing", l.smoothing, "acr | ramp | none");
   c->add_option("--orientation", l.orientation,
-                "programmed | cone | via | monotone | qi | qi_c2 (the last five: lasers)");
+                "programmed | cone | via | monotone (the last three: lasers)");
   c->add_option("--optimise", l.optimise, "jerk (lasers) | none");
   c->add_option("--schedule", l.schedule, "constant (lasers, with --optimise jerk) | programmed");
   c->add_option("--links", l.links,

@@ -71,9 +71,11 @@ bool frees_orientation(const ToleranceSettings& t) { return t.lead > 0.0 || t.ti
 void check_orientation(const MachineDefinition& machine, Refusals& refusals) {
   const RecipeSettings& r = machine.recipe;
   const bool laser = r.kind == "laser";
-  if (r.orientation == "graph" || (r.orientation != "programmed" && !laser))
+  // qi and qi_c2 are what others do, to compare with (examples/paper_b): jerk without bound.
+  const bool baseline = r.orientation == "qi" || r.orientation == "qi_c2";
+  if (r.orientation == "graph" || baseline || (r.orientation != "programmed" && !laser))
     refusals.refuse("recipe.orientation", r.orientation,
-                    laser ? "programmed, cone, via, monotone, qi, qi_c2"
+                    laser ? "programmed, cone, via, monotone (qi and qi_c2 are in the examples)"
                           : "programmed (others are for recipe.kind = \"laser\")");
   if (!frees_orientation(machine.tolerance)) return;
   if (!laser)
