@@ -106,6 +106,8 @@ QpSolution solve_near(const QuadraticProgram& qp, const QpSettings& settings,
 
 QpSolution solve_by_hybrid(const QuadraticProgram& qp, const QpSettings& settings,
                            const QpSolution& banded) {
+  if (!ipopt_available() || qp.layout.channels * qp.layout.controls() > kMostIpoptControls)
+    return banded;
   return solve_near(qp, settings, banded);
 }
 

@@ -107,7 +107,8 @@ TEST_CASE("hybrid_solver: without Ipopt its status", "[kernels][qp]") {
   const QpSolution banded = solve_by_banded(qp, {});
   REQUIRE(banded.status == QpStatus::optimal);
   const QpSolution hybrid = solve_by_hybrid(qp, by_ipopt(), banded);
-  CHECK((hybrid.status == QpStatus::optimal) == ipopt_available());
+  CHECK(hybrid.status == QpStatus::optimal);
+  CHECK((hybrid.solver == QpSolver::ipopt) == ipopt_available());
 }
 
 TEST_CASE("hybrid_solver: a second run gives equal bytes", "[kernels][qp]") {
@@ -119,6 +120,18 @@ TEST_CASE("hybrid_solver: a second run gives equal bytes", "[kernels][qp]") {
   const QpSolution b = solve_by_hybrid(known.qp, by_ipopt(), banded);
   CHECK(std::memcmp(a.x.data(), b.x.data(),
                     sizeof(double) * static_cast<std::size_t>(a.x.size())) == 0);
+}
+
+TEST_CASE("hybrid_solver: above its size Ipopt is not asked", "[kernels][qp]") {
+  QuadraticProgram qp = empty_program(spline_layout(clamped_knots(5, kMostIpoptControls), 3, 1));
+  add_derivative_cost(qp, 0, 3, 1.0);
+  qp.lower.setConstant(-1.0);
+  qp.upper.setConstant(1.0);
+  const QpSolution banded = solve_by_banded(qp, {});
+  REQUIRE(banded.status == QpStatus::optimal);
+  const QpSolution out = solve_by_hybrid(qp, {}, banded);
+  CHECK(out.solver == QpSolver::banded);
+  CHECK(out.x == banded.x);
 }
 
 }  // namespace smoothpost
