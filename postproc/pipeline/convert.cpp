@@ -367,6 +367,8 @@ class Converter {
     if (!result.ok()) return Result<JointPlan>::failure(result.diagnostics());
     out_.stretches = std::move(result.value().stretches);
     const Diagnostics warnings = result.diagnostics();
+    if (!warnings.empty() && !out_.stretches.empty())
+      out_.not_checked.push_back("acceleration_limit and jerk_limit of stretches not optimised");
     tell_stretches();
     return Result<JointPlan>(std::move(result.value().joints), warnings);
   }
