@@ -1,19 +1,54 @@
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <algorithm>
 #include <vector>
 
 #include "kernels/qp/quadratic_program.h"
 
+// Internal to kernels/qp.
 namespace smoothpost {
+
+/// Σ d_j u_j u_jᵀ with u_j the columns of a unit upper triangle: a positive semidefinite matrix
+/// UDUᵀ that only ever grows by positive terms. Entries of very different size keep their digits,
+/// as in a Cholesky factor, where the sum itself would keep those of the largest alone.
+template <int N>
+struct GrowingFactor {
+  Eigen::Matrix<double, N, N> u = Eigen::Matrix<double, N, N>::Identity();
+  Eigen::Matrix<double, N, 1> d = Eigen::Matrix<double, N, 1>::Zero();
+
+  /// Adds weight·a·aᵀ, a zero behind `last`. Agee and Turner's update: no square roots; the weight
+  /// left for the columns before j is weight·d_j/(d_j + weight·a_j²).   @pre weight ≥ 0
+  template <class Vector>
+  void add(double weight, Vector a, int last) {
+    for (int j = last; j >= 0 && weight > 0.0; --j) {
+      const double p = a[j];
+      if (p == 0.0) continue;
+      const double share = weight * p;
+      const double grown = d[j] + share * p;
+      if (grown == 0.0) continue;
+      const double inverse = 1.0 / grown;
+      const double b = share * inverse;
+      weight *= d[j] * inverse;
+      d[j] = grown;
+      double* column = &u(0, j);
+      for (int i = 0; i < j; ++i) {
+        a[i] -= p * column[i];
+        column[i] += b * a[i];
+      }
+    }
+  }
+};
 
 /// Linear-quadratic problems along the pieces of a spline programme: minimise
 ///   Σ_i (½ yᵢᵀ Wᵢ yᵢ + wᵢᵀ yᵢ) + ½ xᵀ W_S x + w_Sᵀ x
 /// over the local variables yᵢ = (state, new number of every channel) of each piece and the state x
 /// behind the last, subject to the layout's equations. M channels, K = degree + 1.
 ///
-/// Order in y: states channel by channel (K − 1 each), then one new number a channel.
+/// Order in y: local variable 0 of every channel, local variable 1 of every channel, …; the last M
+/// are the new ones, the others the state. In this order both steps of the recursion are free on
+/// the factors UDUᵀ of the costs to go: the layout's equations shift the columns by M and leave
+/// them triangular, and the minimum over the new variables drops the last M columns.
 template <int M, int K>
 class PieceRecursion {
  public:
@@ -22,77 +57,61 @@ class PieceRecursion {
   using Local = Eigen::Matrix<double, kLocal, 1>;
   using LocalMatrix = Eigen::Matrix<double, kLocal, kLocal>;
   using State = Eigen::Matrix<double, kStates, 1>;
-  using StateMatrix = Eigen::Matrix<double, kStates, kStates>;
   using New = Eigen::Matrix<double, M, 1>;
+  using Factor = GrowingFactor<kLocal>;
 
   explicit PieceRecursion(const SplineLayout& layout)
-      : levels_(layout.levels), step_(static_cast<std::size_t>(layout.spans())) {
+      : levels_(layout.levels), pieces_(static_cast<std::size_t>(layout.spans())) {
     for (int level = 1; level <= levels_; ++level) {
       const std::vector<double> h = derivative_steps(layout.knots, level);
       for (int i = 0; i < layout.spans(); ++i)
         for (int c = 0; c < M; ++c)
-          step_[static_cast<std::size_t>(i)](level - 1, c) =
+          pieces_[static_cast<std::size_t>(i)].step[(level - 1) * M + c] =
               h[static_cast<std::size_t>(i)] * layout.scale(c, level) / layout.scale(c, level - 1);
     }
-    gain_.resize(step_.size());
-    pivot_.resize(step_.size());
-    feed_.resize(step_.size());
   }
 
-  int spans() const { return static_cast<int>(step_.size()); }
+  int spans() const { return static_cast<int>(pieces_.size()); }
 
   /// Position in y of local variable p (0 … K − 1) of a channel.
-  static constexpr int position(int channel, int p) {
-    return p < K - 1 ? channel * (K - 1) + p : kStates + channel;
-  }
+  static constexpr int position(int channel, int p) { return p * M + channel; }
 
-  /// The state behind piece i.
+  /// The state behind piece i:   Sy, x_q = y_q + step_q·y_{q+1} below the top level, else y_{q+1}.
   State advance(int i, const Local& y) const {
+    const State& step = pieces_[static_cast<std::size_t>(i)].step;
     State next;
-    const auto& h = step_[static_cast<std::size_t>(i)];
-    for (int c = 0; c < M; ++c)
-      for (int p = 0; p < K - 1; ++p)
-        next[c * (K - 1) + p] = p < levels_ ? y[position(c, p)] + h(p, c) * y[position(c, p + 1)]
-                                            : y[position(c, p + 1)];
+    for (int q = 0; q < kStates; ++q)
+      next[q] = q < levels_ * M ? y[q] + step[q] * y[q + M] : y[q + M];
     return next;
   }
 
   /// Sᵀ p for the matrix S of advance().
   Local pull_back(int i, const State& p) const {
-    Local w = Local::Zero();
-    const auto& h = step_[static_cast<std::size_t>(i)];
-    for (int c = 0; c < M; ++c)
-      for (int q = 0; q < K - 1; ++q) {
-        const double value = p[c * (K - 1) + q];
-        if (q < levels_) {
-          w[position(c, q)] += value;
-          w[position(c, q + 1)] += h(q, c) * value;
-        } else {
-          w[position(c, q + 1)] += value;
-        }
-      }
+    const State& step = pieces_[static_cast<std::size_t>(i)].step;
+    Local w;
+    w.template tail<M>().setZero();
+    for (int q = 0; q < kStates; ++q) w[q] = q < levels_ * M ? p[q] : 0.0;
+    for (int q = 0; q < kStates; ++q) w[q + M] += q < levels_ * M ? step[q] * p[q] : p[q];
     return w;
   }
 
-  /// Factors the matrices: W_S, then Wᵢ from the last piece to the first by `matrix(i)`.
-  /// False when a pivot is not positive.
-  template <class MatrixOf>
-  bool factor(const StateMatrix& end, const MatrixOf& matrix) {
-    StateMatrix p = end;
-    LocalMatrix w;
+  /// Factors the costs to go. grow(stage, factor) adds the matrix of a stage (spans: the state
+  /// behind the last piece, in the first kStates variables) to a factor. `proximal`, > 0, is added
+  /// to variables that nothing else may hold.
+  template <class Grow>
+  void factor(double proximal, const Grow& grow) {
+    Factor w;
+    w.d.setConstant(proximal);
+    grow(spans(), w);
     for (int i = spans() - 1; i >= 0; --i) {
-      const std::size_t at = static_cast<std::size_t>(i);
-      w = matrix(i);
-      add_congruence(i, p, w);
-      const Eigen::Matrix<double, M, M> corner = w.template bottomRightCorner<M, M>();
-      pivot_[at].compute(corner);
-      if (pivot_[at].info() != Eigen::Success) return false;
-      const Eigen::Matrix<double, M, kStates> side = w.template bottomLeftCorner<M, kStates>();
-      gain_[at] = pivot_[at].solve(side);
-      p.noalias() = w.template topLeftCorner<kStates, kStates>() - side.transpose() * gain_[at];
+      Piece& piece = pieces_[static_cast<std::size_t>(i)];
+      shift(piece.step, w);
+      w.d.template head<M>().setConstant(proximal);
+      grow(i, w);
+      piece.gain = w.u.template rightCols<M>();
+      piece.inverse = w.d.template tail<M>().cwiseInverse();
     }
-    start_.compute(p);
-    return start_.info() == Eigen::Success;
+    start_ = w;
   }
 
   /// The minimiser for linear terms `vector(i)` of the pieces and `end`; calls take(i, y).
@@ -101,18 +120,25 @@ class PieceRecursion {
   State solve(const State& end, const VectorOf& vector, const Take& take) {
     State p = end;
     for (int i = spans() - 1; i >= 0; --i) {
-      const std::size_t at = static_cast<std::size_t>(i);
-      const Local w = vector(i) + pull_back(i, p);
-      const New side = w.template tail<M>();
-      feed_[at] = pivot_[at].solve(side);
-      p = w.template head<kStates>() - gain_[at].transpose() * side;
+      Piece& piece = pieces_[static_cast<std::size_t>(i)];
+      Local w = vector(i) + pull_back(i, p);
+      for (int c = M - 1; c >= 0; --c) {
+        const double v = w[kStates + c];
+        piece.feed[c] = v * piece.inverse[c];
+        for (int q = 0; q < kStates + c; ++q) w[q] -= v * piece.gain(q, c);
+      }
+      p = w.template head<kStates>();
     }
-    State x = start_.solve(-p);
+    State x = at_start(p);
     Local y;
     for (int i = 0; i < spans(); ++i) {
-      const std::size_t at = static_cast<std::size_t>(i);
+      const Piece& piece = pieces_[static_cast<std::size_t>(i)];
       y.template head<kStates>() = x;
-      y.template tail<M>() = -feed_[at] - gain_[at] * x;
+      for (int c = 0; c < M; ++c) {
+        double sum = piece.feed[c];
+        for (int q = 0; q < kStates + c; ++q) sum += piece.gain(q, c) * y[q];
+        y[kStates + c] = -sum;
+      }
       take(i, y);
       x = advance(i, y);
     }
@@ -120,38 +146,45 @@ class PieceRecursion {
   }
 
  private:
-  // w += Sᵀ p S.
-  void add_congruence(int i, const StateMatrix& p, LocalMatrix& w) const {
-    Eigen::Matrix<double, kStates, kLocal> t;
-    const auto& h = step_[static_cast<std::size_t>(i)];
-    for (int c = 0; c < M; ++c)
-      for (int q = 0; q < K; ++q) {
-        auto column = t.col(position(c, q));
-        const bool own = q < levels_;  // α: q stays in its own place
-        const double left = q == 0 ? 0.0 : (q - 1 < levels_ ? h(q - 1, c) : 1.0);
-        if (own && q > 0)
-          column = p.col(c * (K - 1) + q) + left * p.col(c * (K - 1) + q - 1);
-        else if (own)
-          column = p.col(c * (K - 1));
-        else
-          column = left * p.col(c * (K - 1) + q - 1);
+  struct Piece {
+    State step = State::Ones();             ///< of the levels below the top one
+    Eigen::Matrix<double, kLocal, M> gain;  ///< the last columns of U
+    New inverse, feed;
+  };
+
+  // w becomes Sᵀ(w without its last M variables)S.
+  void shift(const State& step, Factor& w) const {
+    for (int j = kStates - 1; j >= 0; --j) {
+      const auto left = [&](int q) { return q < levels_ * M ? step[q] : 1.0; };
+      const double scale = 1.0 / left(j);
+      double* to = &w.u(0, j + M);
+      const double* from = &w.u(0, j);
+      to[j + M] = 1.0;
+      for (int q = j + M - 1; q >= 0; --q) {
+        double value = q >= M ? left(q - M) * from[q - M] : 0.0;
+        if (q <= j && q < levels_ * M) value += from[q];
+        to[q] = scale * value;
       }
-    for (int c = 0; c < M; ++c)
-      for (int q = 0; q < K; ++q) {
-        auto row = w.row(position(c, q));
-        const bool own = q < levels_;
-        const double left = q == 0 ? 0.0 : (q - 1 < levels_ ? h(q - 1, c) : 1.0);
-        if (own) row += t.row(c * (K - 1) + q);
-        if (q > 0) row += left * t.row(c * (K - 1) + q - 1);
-      }
+      w.d[j + M] = w.d[j] * left(j) * left(j);
+    }
+    w.u.template leftCols<M>().setIdentity();
+  }
+
+  // −(UDUᵀ)⁻¹ p at the first piece.
+  State at_start(const State& p) const {
+    State x = -p;
+    for (int j = kStates - 1; j >= 0; --j)
+      for (int q = 0; q < j; ++q) x[q] -= start_.u(q, j) * x[j];
+    for (int j = 0; j < kStates; ++j) {
+      x[j] /= start_.d[j];
+      for (int q = 0; q < j; ++q) x[j] -= start_.u(q, j) * x[q];
+    }
+    return x;
   }
 
   int levels_;
-  std::vector<Eigen::Matrix<double, K, M>> step_;  ///< (level − 1, channel)
-  std::vector<Eigen::Matrix<double, M, kStates>> gain_;
-  std::vector<Eigen::LLT<Eigen::Matrix<double, M, M>>> pivot_;
-  std::vector<New> feed_;
-  Eigen::LDLT<StateMatrix> start_;
+  std::vector<Piece> pieces_;
+  Factor start_;
 };
 
 }  // namespace smoothpost
