@@ -70,6 +70,14 @@ double BlendFunction::at_zero() const {
   return (15.0 / 16.0 - c1 / 7.0) / 6.0 + c1 / 24.0;
 }
 
+std::vector<double> BlendFunction::knots() const {
+  std::vector<double> inside;
+  if (kind_ != Kind::acr) return inside;
+  for (std::size_t i = kFirstSpan + kSpans / 2; i-- > kFirstSpan;)
+    if (knot(i) < 0.0 && knot(i) > -reach()) inside.push_back(-knot(i));
+  return inside;
+}
+
 BlendValue BlendFunction::at(double u) const {
   if (u <= -reach()) return {};
   if (u >= reach()) return {u, 1.0, 0.0, 0.0};

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "kernels/spline/acr_basis.h"
 
@@ -36,6 +37,8 @@ class BlendFunction {
   BlendValue at(double u) const;
   double reach() const { return kind_ == Kind::acr ? 1.5 : 1.0; }
   double at_zero() const;
+  /// Where |u| passes from one formula to the next inside (0, reach), ascending.
+  std::vector<double> knots() const;
   /// An upper bound of |g''|; for acr by a scan (30 µs, κ = λ = 1/2 free).
   double second_derivative_bound() const;
   bool is_acr() const { return kind_ == Kind::acr; }

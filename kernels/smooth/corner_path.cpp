@@ -426,10 +426,15 @@ std::vector<double> CornerPath::breaks(std::size_t leg) const {
   };
   const Corner& a = corners_[leg];
   const Corner& b = corners_[leg + 1];
-  add(a.half_width * a.blend.reach());
-  add(length - b.half_width * b.blend.reach());
-  add(a.rotation_half_width * rotation_blend_.reach());
-  add(length - b.rotation_half_width * rotation_blend_.reach());
+  const auto add_window = [&](double width, const BlendFunction& blend, bool at_end) {
+    std::vector<double> places = blend.knots();
+    places.push_back(blend.reach());
+    for (const double u : places) add(at_end ? length - width * u : width * u);
+  };
+  add_window(a.half_width, a.blend, false);
+  add_window(b.half_width, b.blend, true);
+  add_window(a.rotation_half_width, rotation_blend_, false);
+  add_window(b.rotation_half_width, rotation_blend_, true);
   std::sort(at.begin(), at.end());
   const auto same = [length](double x, double y) { return y - x <= kSameBreak * length; };
   at.erase(std::unique(at.begin(), at.end(), same), at.end());

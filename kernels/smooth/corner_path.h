@@ -123,8 +123,8 @@ class CornerPath {
   /// Guarantee (test): equals central differences.
   PoseDerivatives derivatives(std::size_t leg, double x) const;
 
-  /// The windows' ends inside leg `leg`, ascending, with 0 and length(leg): between two of them tip
-  /// and rotation are analytic (acr: up to its own knots).
+  /// The windows' ends and the blends' knots inside leg `leg`, ascending, with 0 and length(leg):
+  /// between two of them tip and rotation are analytic.
   std::vector<double> breaks(std::size_t leg) const;
 
   /// A bound of |d²tip/dσ²| (1/mm) and of |d²axis/dσ²| for any axis fixed in the tool (1/mm²),
