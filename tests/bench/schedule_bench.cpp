@@ -1,0 +1,126 @@
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <vector>
+
+#include "kernels/schedule/feed_check.h"
+#include "kernels/schedule/feed_profile.h"
+#include "kernels/schedule/feed_solver.h"
+
+// The feed schedule of an analytic path of six joints, repeated to the length wanted. Argument:
+// collocation points. Counters: microseconds a point, iterations, microseconds a point and
+// iteration, and the share of the check of the finished law.
+namespace smoothpost {
+namespace {
+
+constexpr double kPeriod = 400.0;    // mm
+constexpr double kPeriodTime = 1.7;  // s, about, of one period
+constexpr int kPoints = 5;           // an element
+
+/// q_k = a sin(w s + phase), the second joint s itself; mm, rad.
+FeedPath waves(double length) {
+  FeedPath path;
+  path.breaks = {0.0, length};
+  path.feed = {250.0};
+  path.jet = [](std::size_t, double s) {
+    static constexpr double kWaves[6][3] = {{50.0, 0.020, 0.0}, {0.0, 0.0, 0.0},
+                                            {20.0, 0.035, 0.0}, {0.6, 0.012, 0.0},
+                                            {0.4, 0.017, 1.57}, {10.0, 0.025, 0.0}};
+    PathJet jet{JointVector(6), JointVector(6), JointVector(6)};
+    for (int k = 0; k < 6; ++k) {
+      const double a = kWaves[k][0], w = kWaves[k][1], u = w * s + kWaves[k][2];
+      jet.first[k] = a * w * std::cos(u);
+      jet.second[k] = -a * w * w * std::sin(u);
+      jet.third[k] = -a * w * w * w * std::cos(u);
+    }
+    jet.first[1] = jet.tip_first = 1.0;
+    return jet;
+  };
+  return path;
+}
+
+FeedLimits limits() {
+  FeedLimits result{JointVector(6), JointVector(6), JointVector(6), 8e3, 80e3};
+  result.velocity << 2e3, 2e3, 2e3, 10, 10, 2e3;
+  result.acceleration << 12e3, 12e3, 12e3, 80, 80, 40e3;
+  result.jerk << 120e3, 120e3, 120e3, 200, 200, 400e3;
+  return result;
+}
+
+/// Length whose law has about that many points at 7 ms an element.
+double length_of(int64_t points) {
+  return kPeriod * static_cast<double>(points) / kPoints * 0.007 / kPeriodTime;
+}
+
+/// One solve of the interior point on one grid, from the constant law.
+void BM_Solve(benchmark::State& state) {
+  const FeedPath path = waves(length_of(state.range(0)));
+  const double length = path.breaks.back();
+  const FeedStretch stretch{&path, FeedLanes::from(limits()), 0.0, length,
+                            RestMap(length, {250.0, 8e3, 80e3}, {})};
+  const double extent = stretch.map.extent();
+  const int count = static_cast<int>(state.range(0) / kPoints);
+  const FeedGrid grid = feed_grid(
+      stretch, feed_elements(stretch, {{0.0, extent}, {0.0, extent}}, count), kPoints, true);
+  FeedProgram program;
+  program.grid = &grid;
+  program.lanes = &stretch.lanes;
+  program.factors.resize(grid.points());
+  const std::vector<double> start(grid.controls(), 0.5 * constant_law(program));
+  FeedSolution solution;
+  for (auto _ : state) {
+    solution = solve_feed(program, start, {});
+    benchmark::DoNotOptimize(solution.time);
+  }
+  const double points = static_cast<double>(grid.points());
+  state.counters["iterations"] = solution.iterations;
+  state.counters["converged"] = solution.converged;
+  state.counters["s_per_point"] = benchmark::Counter(
+      points, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(BM_Solve)->Arg(1000)->Arg(10000)->Arg(100000)->Unit(benchmark::kMillisecond);
+
+/// The check on 40 places an element, of the constant law.
+void BM_Check(benchmark::State& state) {
+  const FeedPath path = waves(length_of(state.range(0)));
+  const double length = path.breaks.back();
+  const FeedStretch stretch{&path, FeedLanes::from(limits()), 0.0, length,
+                            RestMap(length, {250.0, 8e3, 80e3}, {})};
+  const double extent = stretch.map.extent();
+  const int count = static_cast<int>(state.range(0) / kPoints);
+  const FeedGrid grid = feed_grid(
+      stretch, feed_elements(stretch, {{0.0, extent}, {0.0, extent}}, count), kPoints, true);
+  const std::vector<double> controls(grid.controls(), 0.5);
+  for (auto _ : state) benchmark::DoNotOptimize(element_loads(stretch, grid, controls));
+  state.counters["s_per_point"] = benchmark::Counter(
+      static_cast<double>(grid.points()),
+      benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(BM_Check)->Arg(10000)->Unit(benchmark::kMillisecond);
+
+/// schedule_feed from rest to rest; from 100,000 points on in windows.
+void BM_Schedule(benchmark::State& state) {
+  const FeedPath path = waves(length_of(state.range(0)));
+  FeedResult result;
+  for (auto _ : state) {
+    result = schedule_feed(path, limits(), {}, {}, {}, {});
+    benchmark::DoNotOptimize(result.elements);
+  }
+  state.counters["iterations"] = result.iterations;
+  state.counters["windows"] = result.windows;
+  state.counters["load"] = result.load.largest();
+  state.counters["s_per_point"] = benchmark::Counter(
+      static_cast<double>(kPoints * result.elements),
+      benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(BM_Schedule)
+    ->Arg(1000)
+    ->Arg(10000)
+    ->Arg(1000000)
+    ->Iterations(1)
+    ->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace smoothpost
+
+BENCHMARK_MAIN();
