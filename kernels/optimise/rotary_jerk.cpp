@@ -1,5 +1,6 @@
 #include "kernels/optimise/rotary_jerk.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -9,15 +10,24 @@
 #include "kernels/core/contract.h"
 #include "kernels/core/units.h"
 #include "kernels/qp/hybrid_solver.h"
+#include "kernels/spline/gauss_rule.h"
 
 namespace smoothpost {
 
 namespace {
 
 constexpr double kStill = 1e-7;  // rad: rotaries of two passes are the same
-constexpr double kSameObjective = 1e-6;
-constexpr double kHolds = 1e-9;      // a window is kept
-constexpr double kTimeShare = 1e-5;  // relative accuracy of the least time
+constexpr double kSameObjective = 1e-5;
+constexpr double kHolds = 1e-9;        // a window is kept
+constexpr double kTimeShare = 1e-4;    // relative accuracy of the least time
+constexpr double kNearlyHolds = 1e-3;  // a window is kept well enough to know the least time
+constexpr double kNear =
+    0.15;  // rad-like: half-spaces of a gap farther away than this are left out
+constexpr double kDifference = 1e-5;  // rad, for the curvature of the tool axis
+
+constexpr double kStretch = 1.5;  // of the time, until a monotone motion is found
+constexpr double kSlowest = 100.0;
+constexpr double kMonotoneShare = 2e-3;  // relative accuracy of its least time
 
 /// A half-space normal·O ≥ 0.
 struct HalfSpace {
@@ -63,10 +73,11 @@ class Passes {
     require(in_.knots.degree == 5, "quintic splines");
     require(in_.seed.size() == in_.windows.size(), "a seed for every window");
     at_ = in_.seed;
+    pull_.assign(at_.size(), Vec3::Zero());
   }
 
   /// The programme with limits of one piece taking t times as long, linear about the last pass.
-  QuadraticProgram programme(double t, double objective_scale) const {
+  QuadraticProgram programme(double t, double objective_scale) {
     SplineLayout layout = spline_layout(in_.knots, 3, 2);
     for (int c = 0; c < 2; ++c) {
       const RateLimits l = slowed(in_.limits[static_cast<std::size_t>(c)], t);
@@ -92,7 +103,20 @@ class Passes {
     }
     if (in_.monotone) add_monotone(qp);
     set_rows(qp, rows(qp.layout));
+    for (std::size_t i = 0; i < at_.size(); ++i)
+      if (!pull_[i].isZero()) add_curvature(qp, i);
     return qp;
+  }
+
+  /// Takes the multipliers of the windows, for the curvature of the next programme.
+  void learn(const QpSolution& solution) {
+    std::fill(pull_.begin(), pull_.end(), Vec3::Zero());
+    for (std::size_t r = 0; r < window_rows_.size(); ++r) {
+      const WindowRow& row = window_rows_[r];
+      if (row.window >= 0)
+        pull_[static_cast<std::size_t>(row.window)] +=
+            solution.row_lower[static_cast<Eigen::Index>(r)] * row.normal;
+    }
   }
 
   /// Moves the place of linearisation to the spline; false: it went only half the way.
@@ -116,7 +140,7 @@ class Passes {
     return !worse;
   }
 
-  /// `objective` is that of this pass' programme.
+  /// `objective` is that of this pass' rotaries.
   bool settled(double objective) {
     const bool same =
         std::abs(objective - objective_) <= kSameObjective * std::abs(objective) + 1e-12;
@@ -133,37 +157,86 @@ class Passes {
     return forward_location(*in_.chain, joints_).axis;
   }
 
-  std::vector<NewRow> rows(const SplineLayout& layout) const {
-    std::vector<NewRow> list;
+  /// A row of a window: normal·O ≥ 0. Via rows have window −1.
+  struct WindowRow {
+    int window = -1;
+    Vec3 normal = Vec3::Zero();
+    NewRow row;
+  };
+
+  std::vector<NewRow> rows(const SplineLayout& layout) {
+    window_rows_.clear();
     for (const RotaryVia& via : in_.via)
       for (int c = 0; c < 2; ++c) {
         const double value = via.q[static_cast<std::size_t>(c)];
-        list.push_back({local_row(layout, c, via.u, 0), value, value, "via point", via.u});
+        window_rows_.push_back(
+            {-1, Vec3::Zero(), {local_row(layout, c, via.u, 0), value, value, "via point", via.u}});
       }
-    for (std::size_t i = 0; i < in_.windows.size(); ++i) add_window(layout, i, list);
+    for (std::size_t i = 0; i < in_.windows.size(); ++i) add_window(layout, i);
+    std::stable_sort(
+        window_rows_.begin(), window_rows_.end(),
+        [](const WindowRow& a, const WindowRow& b) { return a.row.row.span < b.row.row.span; });
+    std::vector<NewRow> list;
+    for (const WindowRow& row : window_rows_) list.push_back(row.row);
     return list;
   }
 
-  void add_window(const SplineLayout& layout, std::size_t i, std::vector<NewRow>& list) const {
+  /// dO/dq of the two rotaries.
+  std::array<Vec3, 2> slopes_at(const std::array<double, 2>& q) const {
+    const Vec3 axis = axis_at(q);
+    const Jacobian jac = jacobian(*in_.chain, joints_);
+    return {Vec3(jac.col(in_.joints[0]).head<3>()).cross(axis),
+            Vec3(jac.col(in_.joints[1]).head<3>()).cross(axis)};
+  }
+
+  // Half-spaces that are far away cannot matter to this pass; of the first one only those of the
+  // gap, as its seed may be anywhere.
+  void add_window(const SplineLayout& layout, std::size_t i) {
     const OrientationWindow& w = in_.windows[i];
     const Vec3 axis = axis_at(at_[i]);
-    const Jacobian jac = jacobian(*in_.chain, joints_);
-    std::array<Vec3, 2> slope;
-    for (std::size_t c = 0; c < 2; ++c)
-      slope[c] = Vec3(jac.col(in_.joints[c]).head<3>()).cross(axis);
+    const std::array<Vec3, 2> slope = slopes_at(at_[i]);
     const LocalRow first = local_row(layout, 0, w.u, 0);
     const LocalRow second = local_row(layout, 1, w.u, 0);
     for (const HalfSpace& h : half_spaces(w)) {
+      const double slack = h.normal.dot(axis);
+      if (slack > kNear && h.name == "gap") continue;
       const double a = h.normal.dot(slope[0]), b = h.normal.dot(slope[1]);
       NewRow row;
       row.row = first;
       row.row.weights = a * first.weights + b * second.weights;
-      row.lower = settings_.cone_margin - h.normal.dot(axis) + a * at_[i][0] + b * at_[i][1];
+      row.lower = settings_.cone_margin - slack + a * at_[i][0] + b * at_[i][1];
       row.upper = std::numeric_limits<double>::infinity();
       row.name = h.name;
       row.place = w.u;
-      list.push_back(std::move(row));
+      window_rows_.push_back({static_cast<int>(i), h.normal, std::move(row)});
     }
+  }
+
+  // The Lagrangian's second derivative by the two rotaries at a window, as far as it is convex:
+  // without it passes swing where the objective is flat.
+  void add_curvature(QuadraticProgram& qp, std::size_t i) const {
+    const std::array<Vec3, 2> here = slopes_at(at_[i]);
+    Eigen::Matrix2d m;
+    for (std::size_t k = 0; k < 2; ++k) {
+      std::array<double, 2> moved = at_[i];
+      moved[k] += kDifference;
+      const std::array<Vec3, 2> there = slopes_at(moved);
+      for (std::size_t c = 0; c < 2; ++c)
+        m(static_cast<int>(c), static_cast<int>(k)) =
+            -pull_[i].dot(there[c] - here[c]) / kDifference;
+    }
+    m = 0.5 * (m + m.transpose()).eval();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(m);
+    m = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() *
+        eigen.eigenvectors().transpose();
+    const Eigen::Vector2d at(at_[i][0], at_[i][1]);
+    const LocalRow first = local_row(qp.layout, 0, in_.windows[i].u, 0);
+    Eigen::MatrixXd weights(first.weights.size(), 2);
+    weights << first.weights, local_row(qp.layout, 1, in_.windows[i].u, 0).weights;
+    const int local = qp.layout.local_size();
+    qp.hessian.middleCols(first.span * local, local) += weights * m * weights.transpose();
+    qp.gradient.col(first.span) -= weights * (m * at);
+    qp.constant += 0.5 * at.dot(m * at);
   }
 
   // Control points of the first derivative that reach between two vias have the sign of the step;
@@ -189,6 +262,8 @@ class Passes {
   const RotarySettings& settings_;
   mutable JointVector joints_;
   std::vector<std::array<double, 2>> at_;
+  std::vector<Vec3> pull_;  ///< Σ multiplier·normal of every window
+  std::vector<WindowRow> window_rows_;
   double outside_ = 0.0;
   double change_ = 0.0;
   double objective_ = -1.0;
@@ -197,6 +272,20 @@ class Passes {
 
 SplineCurve curve_of(const QuadraticProgram& qp, const QpSolution& s) {
   return {qp.layout.knots, controls_of(qp.layout, s.x)};
+}
+
+/// Σ ∫ (q_c''')² du, exactly: the integrand has degree 4.
+double jerk_square(const SplineCurve& q) {
+  const GaussRule& rule = gauss_rule(3);
+  const SplineKnots& knots = q.knots;
+  double sum = 0.0;
+  for (int span = 0; span < knots.spans(); ++span) {
+    const double first = knots.values[static_cast<std::size_t>(span + knots.degree)];
+    const double length = knots.values[static_cast<std::size_t>(span + knots.degree) + 1] - first;
+    for (int g = 0; g < rule.points; ++g)
+      sum += length * rule.weights[g] * q.at(first + length * rule.nodes[g], 3).squaredNorm();
+  }
+  return sum;
 }
 
 // Of ∫ (q''')², so that the objective is of the order of 1 when a rotary is at its jerk limit.
@@ -229,6 +318,12 @@ Relaxation by_cone(const QuadraticProgram& qp) {
   return r;
 }
 
+/// Good enough for the next pass to be linear about it.
+bool near_optimum(const QpSolution& s) {
+  return s.status == QpStatus::optimal ||
+         (s.certificate.violation < 1e-7 && s.certificate.kkt() < 1e-4);
+}
+
 bool usable(const QpSolution& s) {
   return s.status == QpStatus::optimal || s.certificate.violation < 1e-7;
 }
@@ -246,21 +341,48 @@ RotaryStatus verdict(QuadraticProgram qp, const QpSettings& settings, QpFeasibil
                                                       : RotaryStatus::solver_failed;
 }
 
-/// The smoothest rotaries at a time that has room, from those of `out`; false: there are none.
-bool settle_at(RotaryProblem problem, double t, RotaryTime& out) {
+/// The smoothest rotaries at a time that has room, from those of `near`.
+RotaryResult smoothest_at(RotaryProblem problem, double t, const SplineCurve& near,
+                          RotarySettings settings) {
   for (RateLimits& l : problem.limits) l = slowed(l, t);
-  for (std::size_t i = 0; i < problem.windows.size(); ++i) {
-    const Eigen::VectorXd value = out.q.at(problem.windows[i].u);
+  for (std::size_t i = 0; near.controls.size() > 0 && i < problem.windows.size(); ++i) {
+    const Eigen::VectorXd value = near.at(problem.windows[i].u);
     problem.seed[i] = {value[0], value[1]};
   }
-  RotarySettings settings;
+  if (settings.hybrid) settings.solver.solver = QpSolver::banded;
   settings.hybrid = false;
-  RotaryResult there = optimise_rotaries(problem, settings);
-  if (there.status != RotaryStatus::optimal) return false;
-  out.status = RotaryStatus::optimal;
-  out.q = std::move(there.q);
-  out.factor = t;
-  return true;
+  return optimise_rotaries(problem, settings);
+}
+
+/// The signs of `monotone` do not give way to a longer time, and a bound gives way on both of its
+/// sides: the least time by halving instead.
+RotaryTime least_monotone_time(const RotaryProblem& problem, double least,
+                               const RotarySettings& settings) {
+  RotaryTime out;
+  const auto holds = [&](double t) {
+    RotaryResult there = smoothest_at(problem, t, out.q, settings);
+    out.passes += std::max(1, there.passes);
+    if (there.status != RotaryStatus::optimal) {
+      out.why = there.why;
+      return false;
+    }
+    out.status = RotaryStatus::optimal;
+    out.factor = t;
+    out.q = there.q;
+    out.result = std::move(there);
+    return true;
+  };
+  double below = least;
+  if (holds(least)) return out;
+  while (!holds(kStretch * below)) {
+    below *= kStretch;
+    if (below > kSlowest * least) return out;
+  }
+  while (out.factor > below * (1.0 + kMonotoneShare)) {
+    const double middle = std::sqrt(below * out.factor);
+    if (!holds(middle)) below = middle;
+  }
+  return out;
 }
 
 }  // namespace
@@ -286,11 +408,11 @@ RotaryResult optimise_rotaries(const RotaryProblem& problem, const RotarySetting
   for (int pass = 0; pass < settings.most_passes; ++pass) {
     qp = passes.programme(1.0, scale_of(problem, 1.0));
     out.solution = solve_qp(qp, banded);
-    if (out.solution.status != QpStatus::optimal && kept) {
-      std::tie(qp, out) = std::move(*kept);
+    if (!near_optimum(out.solution) && kept) {
+      out.status = RotaryStatus::not_converged;
       break;
     }
-    if (out.solution.status != QpStatus::optimal) {
+    if (!near_optimum(out.solution)) {
       // Windows may be out of reach of the linear model: nearer by the elastic form, then again.
       QuadraticProgram elastic = qp;
       elastic.relaxation = by_cone(qp);
@@ -300,38 +422,46 @@ RotaryResult optimise_rotaries(const RotaryProblem& problem, const RotarySetting
       out.solution = out.why.solution;
     } else {
       out.status = RotaryStatus::not_converged;
+      passes.learn(out.solution);
     }
     out.q = curve_of(qp, out.solution);
     passes.follow(out.q);
     out.passes = passes.passes();
     out.outside = passes.outside();
     if (out.status != RotaryStatus::not_converged) continue;
-    if (problem.windows.empty() || passes.settled(out.solution.objective)) {
+    // A solution that is near its optimum is good for a next pass, not for the answer.
+    if (out.solution.status != QpStatus::optimal) continue;
+    if (problem.windows.empty() || passes.settled(jerk_square(out.q))) {
       out.status = RotaryStatus::optimal;
       break;
     }
     if (out.outside <= kHolds) kept.emplace(qp, out);
   }
-  if (out.status == RotaryStatus::not_converged && out.outside <= kHolds)
+  if (out.status == RotaryStatus::not_converged && kept) {
+    std::tie(qp, out) = std::move(*kept);
     out.status = RotaryStatus::optimal;
+  }
   if (out.status == RotaryStatus::too_fast) out.status = verdict(qp, banded, out.why);
   if (out.status != RotaryStatus::optimal) return out;
-  if (settings.hybrid) {
-    const QpSolution last = solve_by_hybrid(qp, settings.solver, out.solution);
-    if (last.status != QpStatus::optimal) {
-      out.status = RotaryStatus::solver_failed;
-      out.solution = last;
-      return out;
-    }
-    out.solution = last;
-    out.q = curve_of(qp, last);
-  }
-  out.solution.objective /= scale_of(problem, 1.0);
-  return out;
+  out.programme = std::move(qp);
+  out.solution.objective = jerk_square(out.q);
+  return settings.hybrid ? polish_rotaries(std::move(out), settings) : out;
+}
+
+RotaryResult polish_rotaries(RotaryResult result, const RotarySettings& settings) {
+  require(result.status == RotaryStatus::optimal, "rotaries to polish");
+  result.solution = solve_by_hybrid(result.programme, settings.solver, result.solution);
+  if (result.solution.status == QpStatus::optimal)
+    result.q = curve_of(result.programme, result.solution);
+  else
+    result.status = RotaryStatus::solver_failed;
+  result.solution.objective = jerk_square(result.q);
+  return result;
 }
 
 RotaryTime least_rotary_time(const RotaryProblem& problem, double least,
                              const RotarySettings& settings) {
+  if (problem.monotone) return least_monotone_time(problem, least, settings);
   Passes passes(problem, settings);
   RotaryTime out;
   double t = least;
@@ -359,16 +489,22 @@ RotaryTime least_rotary_time(const RotaryProblem& problem, double least,
     passes.follow(out.q);
     out.passes = passes.passes();
     out.status = RotaryStatus::not_converged;
-    if (passes.outside() < 1e-6 && std::abs(t / before - 1.0) < kTimeShare) {
-      out.status = RotaryStatus::optimal;
-      break;
-    }
+    if (passes.outside() < kNearlyHolds && std::abs(t / before - 1.0) < kTimeShare) break;
   }
-  out.factor = t * (1.0 + 3.0 * kTimeShare);
-  // Where there is time to spare the least τ is no place to stand still at: a little more is.
-  if (out.status == RotaryStatus::not_converged)
-    for (const double spare : {3.0 * kTimeShare, 1e-3, 3e-3, 1e-2})
-      if (settle_at(problem, t * (1.0 + spare), out)) break;
+  out.factor = t;
+  if (out.status != RotaryStatus::not_converged) return out;
+  // The least time itself leaves one spline, or none by rounding.
+  for (const double spare : {0.0, 3e-3, 1e-2}) {
+    if (spare == 0.0 && t > least) continue;
+    RotaryResult there = smoothest_at(problem, t * (1.0 + spare), out.q, settings);
+    if (there.status != RotaryStatus::optimal) continue;
+    out.status = RotaryStatus::optimal;
+    out.factor = t * (1.0 + spare);
+    out.q = there.q;
+    out.passes += there.passes;
+    out.result = std::move(there);
+    break;
+  }
   return out;
 }
 

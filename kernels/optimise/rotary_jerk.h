@@ -58,8 +58,9 @@ enum class RotaryStatus {
 
 struct RotaryResult {
   RotaryStatus status = RotaryStatus::solver_failed;
-  SplineCurve q;        ///< two components, rad
-  QpSolution solution;  ///< of the last pass; objective Σ ∫ (q''')² du, rad²/u⁵
+  SplineCurve q;               ///< two components, rad
+  QpSolution solution;         ///< of the last pass; objective Σ ∫ (q''')² du, rad²/u⁵
+  QuadraticProgram programme;  ///< of the last pass, when there is a solution
   int passes = 0;
   double outside = 0.0;  ///< largest OrientationWindow::outside at the windows
   QpFeasibility why;     ///< when there is no solution: which limit, where
@@ -71,30 +72,40 @@ struct RotaryResult {
 ///
 /// The half-spaces (tan(high)·N − T)·O ≥ 0, (T − tan(low)·N)·O ≥ 0 (B for tilt) and the pyramid
 /// of 16 sides inside the widest cone are exact in O; O is linear in (q1, q2) about the last pass:
-/// O ≈ O_r + Σ (w_c × O_r)(q_c − q_r,c). Passes repeat until the windows hold to 1e-9 and the
-/// rotaries stand still to 1e-7; a pass that violates more than the one before goes half the way.
+/// O ≈ O_r + Σ (w_c × O_r)(q_c − q_r,c). Sides of the pyramid that are more than 0.15 away stay out
+/// of a pass. The second derivative of the windows' part of the Lagrangian by (q1, q2), with the
+/// last pass' multipliers and as far as it is convex, is added to each programme (sequential
+/// quadratic programming): it vanishes where passes stand still, and without it they swing where
+/// the objective is flat. Passes repeat until the windows hold to 1e-9 and the rotaries stand still
+/// to 1e-7 or the objective to 1e-5; one that violates more than the one before goes half the way.
 /// Guarantees (tests): every window holds at its place; limits hold everywhere (control points);
 /// KKT of the last programme; via points exact; deterministic; monotone: the control points of the
 /// first derivative that reach between two vias have the sign of the step, 0 where it turns around.
-/// Units: rad, u.   Cost: passes × about 15 iterations, linear in pieces and windows.
+/// Units: rad, u.   Cost: passes (about 6) × 30 iterations, linear in pieces and windows.
 /// Implements [Ding2025] Eq. (57)-(61). Differences from the paper: the printed programme has no
 /// condition between via points and turns up to 41° off there (test); via values have to be
 /// unwound; windows at every cutter location take their place.
 RotaryResult optimise_rotaries(const RotaryProblem& problem, const RotarySettings& settings = {});
 
+/// The last programme of a result of optimise_rotaries() once more by Ipopt: what `hybrid` does.
+/// @pre result.status optimal   @return solver_failed when Ipopt has no optimum
+RotaryResult polish_rotaries(RotaryResult result, const RotarySettings& settings);
+
 /// By how much a stretch has to slow down so that the rotaries keep their limits, and why.
 struct RotaryTime {
   RotaryStatus status = RotaryStatus::solver_failed;
   double factor = 1.0;  ///< t ≥ `least`: each piece has to take t times as long
-  QpFeasibility why;    ///< which limit is tight there
+  QpFeasibility why;    ///< which limit is tight at the least t
   SplineCurve q;        ///< rotaries that keep the limits at the factor
+  RotaryResult result;  ///< optimise_rotaries() at the factor, by the banded solver; its q is `q`
   int passes = 0;
 };
 
 /// The least t ≥ `least` such that optimise_rotaries() has a solution when velocity limits are
 /// multiplied by t, acceleration by t², jerk by t³ (StandoffTimeFactor has the method; here every
-/// pass moves the cone's half-spaces too). Where the windows do not stand still at the least time,
-/// up to 1 % more: `q` are then the smoothest rotaries at the factor.
+/// pass moves the cone's half-spaces too), to 1e-4. `factor` is 0.3 % more, where there is room for
+/// the smoothest rotaries, and 1 % more where those are not found there; with time to spare it is
+/// `least`. `monotone`: by halving, to 0.2 %, as the signs do not give way to a longer time.
 /// Guarantees (tests): windows and limits hold at the factor; not 2 % below it; Case 2 of paper B.
 RotaryTime least_rotary_time(const RotaryProblem& problem, double least,
                              const RotarySettings& settings = {});

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "kernels/core/contract.h"
+#include "kernels/qp/hybrid_solver.h"
 #include "kernels/spline/gauss_rule.h"
 
 namespace smoothpost {
@@ -25,6 +26,12 @@ constexpr double kTimeAccuracy = 5e-5;
 constexpr int kMaxSolves = 20;
 // A least τ above this is no rounding: the limits are too narrow.
 constexpr double kFeasible = 1e-8;
+// Places a piece where the linears are looked at between the rows, how far a limit may be exceeded
+// there, by how much more than the excess it is narrowed, and how often.
+constexpr int kBetween = 12;
+constexpr double kExceeded = 1e-9;
+constexpr double kTighter = 2e-4;
+constexpr int kMostTightenings = 3;
 
 constexpr std::string_view kRowNames[3][3] = {
     {"velocity of the first linear", "acceleration of the first linear",
@@ -189,6 +196,67 @@ SplineLayout layout_of(const Task& task, const RateLimits& limits) {
   return layout;
 }
 
+/// Places where the limits of the linears are looked at between those of the rows.
+std::vector<Place> places_between(const HeadGeometry& head, const SplineCurve& tip,
+                                  const SplineCurve& rotary, const Task& task) {
+  std::vector<Place> places;
+  const int count = kBetween * task.knots.spans();
+  for (int k = 0; k <= count; ++k) {
+    const double share = static_cast<double>(k) / count;
+    places.push_back(
+        place_at(head, tip, rotary,
+                 k == count ? task.knots.last() : task.knots.first() + share * task.length()));
+    places.back().linears.a += task.middle * places.back().linears.b;
+  }
+  return places;
+}
+
+/// The largest magnitude of a curve through equally spaced values, by the parabola at each one.
+double peak_of(const std::vector<double>& values) {
+  double peak = 0.0;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    double here = std::abs(values[k]);
+    if (k > 0 && k + 1 < values.size()) {
+      const double before = std::copysign(1.0, values[k]) * values[k - 1];
+      const double behind = std::copysign(1.0, values[k]) * values[k + 1];
+      const double bend = 2.0 * here - before - behind;
+      if (here >= before && here >= behind && bend > kTiny)
+        here += (behind - before) * (behind - before) / (8.0 * bend);
+    }
+    peak = std::max(peak, here);
+  }
+  return peak;
+}
+
+double& limit_of(RateLimits& limits, int order) {
+  if (order == 1) return limits.velocity;
+  return order == 2 ? limits.acceleration : limits.jerk;
+}
+
+/// Narrows those limits of the linears in `tight` that a solution exceeds between the rows' places;
+/// false: none is exceeded.
+bool tighten(const std::vector<Place>& between, const SplineCurve& offset,
+             const StandoffOptions& settings, StandoffOptions& tight) {
+  std::array<std::array<std::vector<double>, 3>, 3> values;  // of joint and order
+  for (const Place& place : between)
+    for (int order = 1; order <= 3; ++order) {
+      Vec3 value = place.linears.a.col(order);
+      for (int s = 0; s <= order; ++s)
+        value += kBinomial[order][s] * offset.at(place.u, s)[0] * place.linears.b.col(order - s);
+      for (int i = 0; i < 3; ++i) values[i][order - 1].push_back(value[i]);
+    }
+  bool exceeded = false;
+  for (int i = 0; i < 3; ++i)
+    for (int order = 1; order <= 3; ++order) {
+      const double ratio =
+          peak_of(values[i][order - 1]) / limit_of(std::as_const(settings.linear[i]), order);
+      if (ratio <= 1.0 + kExceeded) continue;
+      limit_of(tight.linear[i], order) /= ratio * (1.0 + kTighter);
+      exceeded = true;
+    }
+  return exceeded;
+}
+
 /// What the objective is divided by.
 double objective_scale(const Task& task, const SplineLayout& layout) {
   const double jerk = layout.scale(0, kLevels);
@@ -328,11 +396,24 @@ struct Bracket {
 StandoffResult optimise_standoff(const HeadGeometry& head, const SplineCurve& tip,
                                  const SplineCurve& rotary, const StandoffOptions& settings) {
   const Task task = task_of(head, tip, rotary, settings);
-  const QuadraticProgram qp = programme(task, settings);
+  const std::vector<Place> between = places_between(head, tip, rotary, task);
+  QpSettings solver = settings.solver;
+  if (settings.hybrid) solver.solver = QpSolver::banded;
   StandoffResult result;
   result.q6 = held_at(task.knots, settings.fixed_ends ? settings.start - task.middle : 0.0);
   result.jerk_before = result.jerk_after = jerk_integral(task, result.q6);
-  result.solution = solve_qp(qp, settings.solver);
+  StandoffOptions tight = settings;
+  QuadraticProgram qp;
+  for (int round = 0;; ++round) {
+    qp = programme(task, tight);
+    result.solution = solve_qp(qp, solver);
+    if (result.solution.status != QpStatus::optimal || round == kMostTightenings) break;
+    if (!tighten(between, {qp.layout.knots, controls_of(qp.layout, result.solution.x)}, settings,
+                 tight))
+      break;
+  }
+  if (settings.hybrid && result.solution.status == QpStatus::optimal)
+    result.solution = solve_by_hybrid(qp, settings.solver, result.solution);
   result.solution.objective *= objective_scale(task, qp.layout);
   if (result.solution.status == QpStatus::optimal) {
     result.q6.controls = controls_of(qp.layout, result.solution.x);

@@ -30,6 +30,7 @@ struct StandoffOptions {
   double start = 0.0, end = 0.0;  ///< q6 at the ends when `fixed_ends`, mm, in range
   bool fixed_ends = false;
   QpSettings solver;
+  bool hybrid = false;  ///< banded, then once more by Ipopt (solve_by_hybrid)
 };
 
 /// The standoff that makes the linear axes smoothest, for given tip and rotaries.
@@ -47,11 +48,12 @@ struct StandoffResult {
 ///   Σ_{i=1..3} ∫ (q_i''')² du + ε ∫ (q6''')² du,   q_i = a_i(u) + b_i(u) q6(u) (HeadGeometry),
 /// by 5 Gauss points a piece, under lower ≤ q6 ≤ upper, |q6'|, |q6''|, |q6'''| limits on control
 /// points, |q_i'|, |q_i''|, |q_i'''| limits at places of each piece, and q6' = q6'' = 0 at the
-/// ends. Convex; tip and tool axis are not touched by any q6. Guarantees (tests): golden qp_q6 of
-/// paper_b.json; limits hold on a dense grid, those of q1 … q3 within 1 % between the places;
-/// the tip stays to 1e-9 mm; not above the held standoff.
-/// Units: mm, rad, and u as the knots have it (unit pieces keep the numbers well conditioned).
-/// Cost: linear in the pieces, allocates.
+/// ends. Where a limit of q1 … q3 is exceeded between those places (looked for at 12 places a piece
+/// and the parabolas through them) its rows are narrowed by that share and 2e-4, and the programme
+/// is solved again, at most three times. Convex; tip and tool axis are not touched by any q6.
+/// Guarantees (tests): golden qp_q6 of paper_b.json; limits hold on a dense grid; the tip stays to
+/// 1e-9 mm; not above the held standoff. Units: mm, rad, and u as the knots have it (unit pieces
+/// keep the numbers well conditioned). Cost: linear in the pieces, allocates.
 /// @param tip 3 components, mm, W   @param rotary 2 components, rad; both on clamped quintic knots
 /// over the same range; `tip` may have other knots.
 /// @pre as said at the parameters; limits > 0, rows_per_span ≥ 1, ε and pull ≥ 0, ends in range

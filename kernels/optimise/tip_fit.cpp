@@ -77,9 +77,8 @@ TipFit fit_tip(const TipFitProblem& p) {
     if (p.hybrid) banded.solver = QpSolver::banded;
     QpSolution s = solve_qp(qp, banded);
     if (s.status != QpStatus::optimal) {
-      const QpFeasibility why = feasibility(qp, banded);
       out.failed = c;
-      out.place = why.place;
+      if (p.explain) out.place = feasibility(qp, banded).place;
       out.solutions.push_back(std::move(s));
       return out;
     }

@@ -15,6 +15,7 @@ struct TipFitProblem {
   double tolerance = 0.0;    ///< mm, > 0: largest distance at each parameter
   bool hybrid = true;        ///< the last word is Ipopt's
   QpSettings solver;
+  bool explain = true;  ///< find the place of a failure: one more programme
 };
 
 struct TipFit {
@@ -22,7 +23,7 @@ struct TipFit {
   std::vector<QpSolution> solutions;  ///< of the three coordinates
   /// A coordinate without a solution: the knots are too far apart for the points. Else −1.
   int failed = -1;
-  double place = 0.0;  ///< u where it fails most
+  double place = 0.0;  ///< u where it fails most, with `explain`
 };
 
 /// The smoothest curve near given points: per coordinate

@@ -52,6 +52,9 @@ class LaserPlanner {
         plan.joints.samples.insert(plan.joints.samples.end(), samples.begin() + from,
                                    samples.end());
         next = planner.end_sample();
+        plan.paths.push_back({std::move(result.value().path),
+                              plan.joints.samples.size() - samples.size(),
+                              std::move(result.value().u)});
         plan.stretches.push_back(std::move(result.value().report));
       }
       if (!progress_("optimise",
@@ -71,9 +74,7 @@ class LaserPlanner {
       const bool kept = !orientation_is_free(in_.machine);
       if (!(d.code == "KN153" || d.code == "KN154" || (d.code == "KN151" && kept))) return false;
       d.severity = Severity::warning;
-      d.text +=
-          ". This stretch keeps the joints of the programmed path: nothing is planned of its "
-          "accelerations and jerks";
+      d.text += ". This stretch keeps the joints of the programmed path";
     }
     return true;
   }

@@ -7,6 +7,7 @@
 #include "postproc/pipeline/cuts.h"
 #include "postproc/pipeline/cutting_frame.h"
 #include "postproc/pipeline/joint_plan.h"
+#include "postproc/pipeline/laser_joint_path.h"
 
 namespace smoothpost {
 
@@ -44,9 +45,21 @@ struct LaserStretch {
   bool normal_from_part = false;
 };
 
+/// The joints of a planned stretch between the samples that stand for it in a LaserPlan.
+struct LaserPlanPath {
+  LaserJointPath path;
+  /// joints.samples[first_sample + i] is path.joints(u[i]); the first one is the stretch's start,
+  /// which is the end of a stretch that went right before.
+  std::size_t first_sample = 0;
+  std::vector<double> u;  ///< ascending, from path.first() to path.last()
+
+  std::size_t last_sample() const { return first_sample + u.size() - 1; }
+};
+
 struct LaserPlan {
   JointPlan joints;
   std::vector<LaserStretch> stretches;
+  std::vector<LaserPlanPath> paths;  ///< one a stretch
 };
 
 struct LaserPlanInput {
@@ -70,7 +83,9 @@ struct LaserPlanInput {
 /// Failures, each with input lines: KN150 a machine that is no such head; KN151 no orientation
 /// keeps the windows; KN152 the programmed feed is too fast (schedule = "programmed"); KN153 the
 /// tip cannot be smoothed inside its tolerance; KN154 a solver broke down.
-/// Cost: about 0.3 s for 160 control points with recipe.solver = "hybrid".
+/// The tip's programmes and all passes are the banded solver's; with recipe.solver = "hybrid" Ipopt
+/// solves the last programmes of rotaries and standoff once more.
+/// Cost: about 0.7 s for 160 control points, 0.1 s of it Ipopt's.
 Result<LaserPlan> plan_laser(const LaserPlanInput& input, const JointPlan& base,
                              const Progress& progress);
 

@@ -77,6 +77,11 @@ StretchPath::StretchPath(const ReferencePath& reference, const StretchRange& ran
     const double feed = feed_of(reference, k);
     if (feed > 0.0) feed_ = std::min(feed_, feed);
   }
+  std::vector<double> lengths;
+  for (std::size_t i = 1; i < starts_.size(); ++i) lengths.push_back(starts_[i] - starts_[i - 1]);
+  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
+  std::nth_element(lengths.begin(), middle, lengths.end());
+  spacing_ = std::clamp(*middle, 0.25, 1.0);
 }
 
 PathPlace StretchPath::place(double s) const {
@@ -89,14 +94,6 @@ PathPlace StretchPath::place(double s) const {
 
 std::uint32_t StretchPath::line(double s) const {
   return reference_.path().points[place(s).segment].line;
-}
-
-double StretchPath::spacing() const {
-  std::vector<double> lengths;
-  for (std::size_t i = 1; i < starts_.size(); ++i) lengths.push_back(starts_[i] - starts_[i - 1]);
-  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
-  std::nth_element(lengths.begin(), middle, lengths.end());
-  return std::clamp(*middle, 0.25, 1.0);
 }
 
 }  // namespace smoothpost

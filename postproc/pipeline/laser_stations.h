@@ -32,13 +32,14 @@ class StretchPath {
   double end_of(std::uint32_t segment) const { return starts_[segment - range_.first + 1]; }
   std::uint32_t line(double s) const;
   /// Distance of cutter locations, mm: the median of the segments' lengths, 0.25 to 1 mm.
-  double spacing() const;
+  double spacing() const { return spacing_; }
 
  private:
   const ReferencePath& reference_;
   StretchRange range_;
   std::vector<double> starts_;  ///< length at the start of each segment, and the whole
   double feed_ = 0.0;
+  double spacing_ = 0.0;
 };
 
 }  // namespace smoothpost

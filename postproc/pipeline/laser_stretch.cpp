@@ -2,10 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "kernels/core/units.h"
+#include "kernels/kinematics/inverse.h"
 #include "postproc/pipeline/conversion_parts.h"
+#include "postproc/pipeline/laser_samples.h"
 #include "postproc/pipeline/orientation_check.h"
+#include "postproc/pipeline/tool_motion.h"
 
 namespace smoothpost {
 
@@ -14,6 +18,7 @@ namespace {
 constexpr double kDense = 0.25;       // of the stations' distance: nearer segment ends are passed
 constexpr int kLeastPieces = 6;       // of a stretch that is worth splines of its own
 constexpr double kBackOff = 1.003;    // of the least time: at it the programmes have one point
+constexpr double kSame = 1e-4;        // of a feed
 constexpr double kSlower = 1.01;      // when rotaries and standoff do not agree on a feed
 constexpr double kMuchSlower = 1.05;  // when a programme does not say how much
 constexpr int kMostFeeds = 16;
@@ -21,10 +26,6 @@ constexpr double kLeastKept = 0.05;  // share of a tolerance that is left after 
 // Of the orientation's freedom, for the turn of the tangent between stations.
 constexpr double kTurnMargin = 0.1 * kRadiansPerDegree;
 constexpr int kMeasures = 8;  // places a piece where peaks are looked for
-
-double nearest_turn(double angle, double reference) {
-  return angle + 2.0 * kPi * std::round((reference - angle) / (2.0 * kPi));
-}
 
 double nan_free(double numerator, double limit) { return limit > 0.0 ? numerator / limit : 0.0; }
 
@@ -40,42 +41,21 @@ const char* level_name(int level) {
   return kNames[level];
 }
 
-Jet jet_of(const SplineCurve& curve, int component, double u) {
-  Jet jet{};
-  for (int order = 0; order < 4; ++order)
-    jet[static_cast<std::size_t>(order)] = curve.at(u, order)[component];
-  return jet;
-}
-
-VectorJet tip_jet(const SplineCurve& curve, double u) {
-  VectorJet jet;
-  for (int order = 0; order < 4; ++order) jet.col(order) = curve.at(u, order);
-  return jet;
-}
-
-/// Derivatives of a_i + b_i·q6 by u, orders 0 … 3.
-Jet linear_jet(const LinearsByStandoff& l, int i, const Jet& q6) {
-  constexpr double kBinomial[4][4] = {{1, 0, 0, 0}, {1, 1, 0, 0}, {1, 2, 1, 0}, {1, 3, 3, 1}};
-  Jet jet{};
-  for (int n = 0; n < 4; ++n) {
-    double value = l.a(i, n);
-    for (int r = 0; r <= n; ++r)
-      value += kBinomial[n][r] * l.b(i, n - r) * q6[static_cast<std::size_t>(r)];
-    jet[static_cast<std::size_t>(n)] = value;
-  }
-  return jet;
-}
-
 RateLimits limits_by_parameter(const AxisDefinition& axis, double share, double rate) {
   return {axis.velocity * share / rate, axis.acceleration * share / (rate * rate),
           axis.jerk * share / (rate * rate * rate)};
 }
 
-/// By how much a motion with these derivatives has to slow down to keep its limits.
-double time_of(const Jet& jet, const RateLimits& l) {
-  return std::max({nan_free(std::abs(jet[1]), l.velocity),
-                   std::sqrt(nan_free(std::abs(jet[2]), l.acceleration)),
-                   std::cbrt(nan_free(std::abs(jet[3]), l.jerk))});
+/// By how much a motion has to slow down so that this derivative keeps its limit.
+double time_of(double value, const RateLimits& l, int order) {
+  switch (order) {
+    case 1:
+      return nan_free(value, l.velocity);
+    case 2:
+      return std::sqrt(nan_free(value, l.acceleration));
+    default:
+      return std::cbrt(nan_free(value, l.jerk));
+  }
 }
 
 }  // namespace
@@ -95,8 +75,7 @@ StretchPlanner::StretchPlanner(StretchInput input, const std::vector<JointSample
   end_sample_ = static_cast<std::size_t>(end - base.begin());
   // The start of the stretch is the sample before; where the stretch starts its cut it is ours too.
   if (first_sample_ > 0) --first_sample_;
-  const double length = in_.laser.reference.path().points[in_.range.first].tool_length;
-  head_.tip -= length * head_.tool_axis;
+  head_.tip -= tool_length() * head_.tool_axis;
   settings_.hybrid = machine_.recipe.solver == "hybrid";
   settings_.solver.solver = machine_.recipe.solver == "banded" ? QpSolver::banded : QpSolver::ipopt;
 }
@@ -108,21 +87,16 @@ bool StretchPlanner::worth_it() const {
 
 Result<PlannedStretch> StretchPlanner::run() {
   using Failure = Result<PlannedStretch>;
-  const double spacing = path_.spacing();
-  const int every = machine_.recipe.knot_every;
-  bool fits = false;
-  // Two stations a cutter location: between two of them the input is straight, a spline is not.
-  for (int k = every; !fits && k >= 1; k = k > 1 ? k / 2 : 0) fits = fit(0.5 * spacing, 2 * k);
-  for (double share = 0.25; !fits && share > 0.05; share *= 0.5) fits = fit(spacing * share, 2);
-  if (!fits) return Failure::failure(not_smooth());
+  if (!fit_any()) return Failure::failure(not_smooth());
   for (int round = 0;; ++round) {
     if (auto problem = find_feed()) return Failure::failure(*problem);
     if (auto problem = settle()) return Failure::failure(*problem);
     if (keeps_to_input()) break;
     // Something of the input lies between the stations: once more with closer ones.
-    if (round > 0 || !fit(0.25 * spacing, 4)) return Failure::failure(not_smooth());
+    if (round > 0 || !fit(0.25 * path_.spacing(), 4, true)) return Failure::failure(not_smooth());
   }
   PlannedStretch out;
+  out.path = joint_path(standoff_);
   sample(out);
   report_.first = in_.range.first;
   report_.last = in_.range.last;
@@ -131,8 +105,8 @@ Result<PlannedStretch> StretchPlanner::run() {
   report_.programmed_feed = path_.feed();
   report_.control_points = grid_.knots.controls();
   report_.normal_from_part = in_.frames.from_part();
-  out.report = report_;
-  measure(out);
+  report_.peaks = peaks_of(out.path, path_, rate_of(feed_));
+  out.report = std::move(report_);
   return Failure(std::move(out));
 }
 
@@ -152,9 +126,10 @@ Diagnostic StretchPlanner::not_smooth() const {
 // At every point of the input and in the middles between the stations.
 bool StretchPlanner::keeps_to_input() const {
   const auto& t = machine_.tolerance;
-  // What chord_holds() leaves.
+  // What sample_path() leaves.
   const double share = 1.0 - 0.85 * t.budget.chord - t.budget.rounding;
   const bool kept = !orientation_is_free(machine_);
+  const LaserJointPath ours = joint_path(standoff_);
   std::vector<double> places;
   for (std::uint32_t k = in_.range.first; k <= in_.range.last; ++k)
     places.push_back(path_.end_of(k));
@@ -163,10 +138,9 @@ bool StretchPlanner::keeps_to_input() const {
   return std::all_of(places.begin(), places.end(), [&](double s) {
     const PathPlace at = path_.place(s);
     const CutterLocation input = in_.laser.reference.at(at.segment, at.s);
-    const CutterLocation ours =
-        wanted(std::min(grid_.knots.last(), s / path_.length() * grid_.knots.spans()));
-    return (input.tip - ours.tip).norm() <= share * t.tip &&
-           (!kept || (input.axis - ours.axis).norm() <= share * t.axis);
+    const CutterLocation tool = ours.tool(std::min(ours.last(), ours.parameter_at(s)));
+    return (input.tip - tool.tip).norm() <= share * t.tip &&
+           (!kept || (input.axis - tool.axis).norm() <= share * t.axis);
   });
 }
 
@@ -196,17 +170,30 @@ StretchPlanner::Grid StretchPlanner::grid(double spacing, int every) const {
   return g;
 }
 
-bool StretchPlanner::fit(double spacing, int every) {
+// As few control points as the tip's tolerance allows.
+bool StretchPlanner::fit_any() {
+  const double spacing = path_.spacing();
+  // Two stations a cutter location: between two of them the input is straight, a spline is not.
+  for (int k = machine_.recipe.knot_every; k >= 1; k /= 2)
+    if (fit(0.5 * spacing, 2 * k)) return true;
+  return fit(0.25 * spacing, 2) || fit(0.125 * spacing, 2) || fit(0.0625 * spacing, 2, true);
+}
+
+bool StretchPlanner::fit(double spacing, int every, bool explain) {
   grid_ = grid(spacing, every);
   near_.reset();
+  here_.reset();
   TipFitProblem p;
   p.knots = grid_.knots;
   p.u = grid_.u;
   for (const CutterLocation& location : grid_.location) p.points.push_back(location.tip);
   const auto& t = machine_.tolerance;
   p.tolerance = 0.95 * t.tip * (t.budget.merge + t.budget.smoothing);
-  p.hybrid = settings_.hybrid;
+  // Its certificate says enough: no limit of a joint hangs on this programme.
+  p.hybrid = false;
   p.solver = settings_.solver;
+  if (settings_.hybrid) p.solver.solver = QpSolver::banded;
+  p.explain = explain;
   tip_ = fit_tip(p);
   if (tip_.failed >= 0) return false;
   seed_rotaries(grid_);
@@ -215,28 +202,17 @@ bool StretchPlanner::fit(double spacing, int every) {
 
 // Of the programmed axis, on the branch and turn of the base plan at the start.
 void StretchPlanner::seed_rotaries(Grid& g) const {
-  const int first = in_.laser.pair.first_rotary(), second = in_.laser.pair.second_rotary();
+  const ScrewChain& chain = in_.laser.pair.chain();
+  const std::optional<Inverse> inverse = Inverse::from(chain);
   JointVector near = base_[first_sample_].q;
-  const double length = in_.laser.reference.path().points[in_.range.first].tool_length;
   for (const CutterLocation& location : g.location) {
-    const RotaryPairSolutions solutions =
-        in_.laser.pair.solve(holder_location(location, length), near);
-    double best = INFINITY;
-    JointVector next = near;
-    for (std::size_t b = 0; b < 2; ++b) {
-      if (!solutions.valid[b]) continue;
-      JointVector q = solutions.q[b];
-      double distance = 0.0;
-      for (const int j : {first, second}) {
-        q[j] = nearest_turn(q[j], near[j]);
-        distance += std::abs(q[j] - near[j]);
-      }
-      if (distance >= best) continue;
-      best = distance;
-      next = q;
-    }
-    near = next;
-    g.programmed.push_back({near[first], near[second]});
+    Pose tip = Pose::Identity();
+    tip.translation() = location.tip;
+    tip.linear() =
+        Eigen::Quaterniond::FromTwoVectors(chain.tool_axis, location.axis).toRotationMatrix();
+    near = inverse->nearest(holder_pose(chain, tip, tool_length()), near).value_or(near);
+    g.programmed.push_back(
+        {near[in_.laser.pair.first_rotary()], near[in_.laser.pair.second_rotary()]});
   }
 }
 
@@ -377,7 +353,8 @@ std::vector<std::size_t> StretchPlanner::via_stations() const {
   // out.
   std::vector<std::size_t> kept;
   for (const std::size_t i : list)
-    if (kept.empty() || grid_.u[i] - grid_.u[kept.back()] >= 2.0 * grid_.knots.degree) kept.push_back(i);
+    if (kept.empty() || grid_.u[i] - grid_.u[kept.back()] >= grid_.knots.degree + 1.0)
+      kept.push_back(i);
   kept.back() = grid_.s.size() - 1;
   return kept;
 }
@@ -405,109 +382,108 @@ StandoffOptions StretchPlanner::standoff_options(double rate) const {
     o.linear[i] =
         limits_by_parameter(machine_.axes[static_cast<std::size_t>(head_.linear[i])], share, rate);
   o.solver = settings_.solver;
-  if (settings_.hybrid) o.solver.solver = QpSolver::banded;
+  o.hybrid = settings_.hybrid;
   o.start = o.end = std::clamp(base_[first_sample_].q[head_.standoff], o.lower, o.upper);
   o.fixed_ends = !in_.range.starts_cut || !in_.range.ends_cut;
   return o;
 }
 
 // With the standoff held the linear axes are given.
-double StretchPlanner::held_time(double rate) const {
-  const StandoffOptions o = standoff_options(rate);
-  const SplineCurve q6 = held_standoff();
-  double t = 0.0;
+StretchPlanner::SlowJoint StretchPlanner::slow_joint() const {
+  const StandoffOptions o = standoff_options(rate_of(feed_));
+  if (!standoff_is_held()) {
+    const StandoffTimeFactor time = least_standoff_time(head_, tip_.curve, rotary_, o);
+    return {time.found, time.factor, time.joint, time.derivative, time.place};
+  }
+  const LaserJointPath path = joint_path(held_standoff());
+  SlowJoint slow;
+  slow.found = true;
   for (int k = 0; k <= kMeasures * grid_.knots.spans(); ++k) {
     const double u = static_cast<double>(k) / kMeasures;
-    const LinearsByStandoff l = linears_by_standoff(head_, tip_jet(tip_.curve, u),
-                                                    jet_of(rotary_, 0, u), jet_of(rotary_, 1, u));
-    for (int i = 0; i < 3; ++i)
-      t = std::max(
-          t, time_of(linear_jet(l, i, jet_of(q6, 0, u)), o.linear[static_cast<std::size_t>(i)]));
+    const JointJet jet = path.jet(u);
+    for (std::size_t i = 0; i < 3; ++i)
+      for (int order = 1; order <= 3; ++order) {
+        const double t = time_of(std::abs(jet(head_.linear[i], order)), o.linear[i], order);
+        if (t > slow.factor) slow = {true, t, head_.linear[i], order, u};
+      }
   }
-  return t;
+  return slow;
 }
 
 // ---- feed
 
 std::optional<Diagnostic> StretchPlanner::find_feed() {
   feed_ = path_.feed();
-  const RotaryTime time = least_rotary_time(rotary_problem(), 1.0, settings_);
+  RotaryTime time = least_rotary_time(rotary_problem(), 1.0, settings_);
   if (time.status == RotaryStatus::cone_empty) return no_orientation(time.why);
   if (time.status != RotaryStatus::optimal) return broke("rotary", time.why.solution);
-  near_ = time.q;
-  if (time.factor > 1.0 + 1e-4) {
+  near_ = std::move(time.q);
+  if (time.factor > 1.0 + kSame) {
     const int joint = rotary_problem().joints[static_cast<std::size_t>(time.why.channel)];
-    note_slow(
-        machine_.axes[static_cast<std::size_t>(joint)].name + " " + level_name(time.why.level),
-        time.why.place);
+    if (machine_.recipe.orientation == "monotone")
+      note_slow("the rotaries' limits while none of them turns back", 0.0);
+    else
+      note_slow(
+          machine_.axes[static_cast<std::size_t>(joint)].name + " " + level_name(time.why.level),
+          time.why.place);
     if (machine_.recipe.schedule == "programmed") return too_fast(time.factor);
-    feed_ /= time.factor * kBackOff;
+    feed_ /= time.factor;
   }
+  here_ = std::move(time.result);
   return {};
 }
 
 // Rotaries and standoff at one feed; slower until both have a solution.
 std::optional<Diagnostic> StretchPlanner::settle() {
+  const bool may_slow = machine_.recipe.schedule != "programmed";
+  RotarySettings banded = settings_;
+  banded.hybrid = false;
+  if (settings_.hybrid) banded.solver.solver = QpSolver::banded;
   for (int round = 0; round < kMostFeeds; ++round) {
-    RotarySettings banded = settings_;
-    banded.hybrid = false;
-    if (settings_.hybrid) banded.solver.solver = QpSolver::banded;
-    const RotaryResult rough = optimise_rotaries(rotary_problem(), banded);
-    if (rough.status == RotaryStatus::cone_empty) return no_orientation(rough.why);
-    if (rough.status != RotaryStatus::optimal) {
-      if (machine_.recipe.schedule == "programmed") return broke("rotary", rough.solution);
+    if (!here_) here_ = optimise_rotaries(rotary_problem(), banded);
+    RotaryResult here = *std::exchange(here_, std::nullopt);
+    if (here.status == RotaryStatus::cone_empty) return no_orientation(here.why);
+    if (here.status != RotaryStatus::optimal) {
+      if (!may_slow) return broke("rotary", here.solution);
       feed_ /= kSlower;
       continue;
     }
-    near_ = rotary_ = rough.q;
-    double factor = 0.0;
-    int joint = -1, derivative = 0;
-    double place = 0.0;
-    if (standoff_is_held()) {
-      factor = held_time(rate_of(feed_));
-      joint = factor > 1.0 ? head_.linear[0] : -1;
-      derivative = 3;
-    } else {
-      const StandoffTimeFactor time =
-          least_standoff_time(head_, tip_.curve, rotary_, standoff_options(rate_of(feed_)));
-      if (!time.found) {
-        // No answer from the elastic form: the programme itself at this feed, or slower.
-        const StandoffResult here =
-            optimise_standoff(head_, tip_.curve, rotary_, standoff_options(rate_of(feed_)));
-        if (here.solution.status != QpStatus::optimal) {
-          if (round + 1 == kMostFeeds || machine_.recipe.schedule == "programmed")
-            return broke("standoff", here.solution);
-          feed_ /= kMuchSlower;
-          continue;
-        }
-      }
-      factor = time.factor;
-      joint = time.joint;
-      derivative = time.derivative;
-      place = time.place;
-    }
-    if (factor > 1.0 + 1e-4) {
-      if (joint >= 0)
-        note_slow(
-            machine_.axes[static_cast<std::size_t>(joint)].name + " " + level_name(derivative),
-            place);
-      if (machine_.recipe.schedule == "programmed") return too_fast(factor);
-      feed_ /= factor * kBackOff;
+    near_ = rotary_ = here.q;
+    const SlowJoint slow = slow_joint();
+    if (!slow.found) {
+      // No answer from the elastic form: the programme itself at this feed, or slower.
+      const StandoffResult standoff =
+          optimise_standoff(head_, tip_.curve, rotary_, standoff_options(rate_of(feed_)));
+      if (standoff.solution.status == QpStatus::optimal) return finish(std::move(here));
+      if (round + 1 == kMostFeeds || !may_slow) return broke("standoff", standoff.solution);
+      feed_ /= kMuchSlower;
       continue;
     }
-    const RotaryResult last = settings_.hybrid || settings_.solver.solver == QpSolver::ipopt
-                                  ? optimise_rotaries(rotary_problem(), settings_)
-                                  : rough;
-    if (last.status != RotaryStatus::optimal) return broke("rotary", last.solution);
-    rotary_ = last.q;
-    report_.passes = last.passes;
-    report_.via_points = static_cast<int>(rotary_problem().via.size());
-    report_.qp.clear();
-    for (const QpSolution& s : tip_.solutions) tell("smooth", s);
-    tell("rotary", last.solution);
-    return solve_standoff(rate_of(feed_));
+    if (slow.factor <= 1.0 + kSame) {
+      const std::optional<Diagnostic> problem = finish(std::move(here));
+      if (!problem || !may_slow || round + 1 == kMostFeeds) return problem;
+      feed_ /= kBackOff;  // there is next to no room at this feed
+      continue;
+    }
+    note_slow(machine_.axes[static_cast<std::size_t>(slow.joint)].name + " " +
+                  level_name(slow.derivative),
+              slow.place);
+    if (!may_slow) return too_fast(slow.factor);
+    feed_ /= slow.factor * kBackOff;
   }
   return broke("rotary", {});
+}
+
+std::optional<Diagnostic> StretchPlanner::finish(RotaryResult rotaries) {
+  if (settings_.hybrid) rotaries = polish_rotaries(std::move(rotaries), settings_);
+  if (rotaries.status != RotaryStatus::optimal) return broke("rotary", rotaries.solution);
+  rotary_ = rotaries.q;
+  report_.passes = rotaries.passes;
+  report_.via_points = static_cast<int>(rotary_problem().via.size());
+  report_.qp.clear();
+  for (const QpSolution& s : tip_.solutions) tell("smooth", s);
+  tell("rotary", rotaries.solution);
+  return solve_standoff(rate_of(feed_));
 }
 
 std::optional<Diagnostic> StretchPlanner::solve_standoff(double rate) {
@@ -515,13 +491,7 @@ std::optional<Diagnostic> StretchPlanner::solve_standoff(double rate) {
     standoff_ = held_standoff();
     return {};
   }
-  StandoffOptions o = standoff_options(rate);
-  StandoffResult r = optimise_standoff(head_, tip_.curve, rotary_, o);
-  if (r.solution.status == QpStatus::optimal && settings_.hybrid) {
-    o.solver = settings_.solver;
-    o.solver.solver = QpSolver::ipopt;
-    r = optimise_standoff(head_, tip_.curve, rotary_, o);
-  }
+  const StandoffResult r = optimise_standoff(head_, tip_.curve, rotary_, standoff_options(rate));
   if (r.solution.status != QpStatus::optimal) return broke("standoff", r.solution);
   standoff_ = r.q6;
   tell("standoff", r.solution);
@@ -540,120 +510,25 @@ void StretchPlanner::note_slow(const std::string& why, double u) {
 
 // ---- samples
 
-JointVector StretchPlanner::joints(double u) const {
-  JointVector q = base_[first_sample_].q;
-  const Eigen::VectorXd r = rotary_.at(u);
-  q[in_.laser.pair.first_rotary()] = r[0];
-  q[in_.laser.pair.second_rotary()] = r[1];
-  q[head_.standoff] = standoff_.at(u)[0];
-  const LinearsByStandoff l = linears_by_standoff(head_, tip_jet(tip_.curve, u),
-                                                  jet_of(rotary_, 0, u), jet_of(rotary_, 1, u));
-  for (int i = 0; i < 3; ++i)
-    q[head_.linear[static_cast<std::size_t>(i)]] = l.a(i, 0) + l.b(i, 0) * q[head_.standoff];
-  return q;
+LaserJointPath StretchPlanner::joint_path(SplineCurve standoff) const {
+  return {head_, tip_.curve, rotary_, std::move(standoff), base_[first_sample_].q, path_.length()};
 }
 
-CutterLocation StretchPlanner::wanted(double u) const {
-  const Eigen::VectorXd r = rotary_.at(u);
-  return {Vec3(tip_.curve.at(u)),
-          Vec3(axis_jet(head_, {r[0], 0.0, 0.0, 0.0}, {r[1], 0.0, 0.0, 0.0}).col(0))};
-}
-
-bool StretchPlanner::chord_holds(double from, double to, const JointVector& a,
-                                 const JointVector& b) const {
-  const double length = in_.laser.reference.path().points[in_.range.first].tool_length;
-  const auto& t = machine_.tolerance;
-  for (const double share : {0.25, 0.5, 0.75}) {
-    const CutterLocation want = wanted(from + share * (to - from));
-    const JointVector q = a + share * (b - a);
-    const CutterLocation holder = forward_location(in_.laser.pair.chain(), q);
-    if ((holder.tip - length * holder.axis - want.tip).norm() > 0.8 * t.tip * t.budget.chord)
-      return false;
-    if ((holder.axis - want.axis).norm() > 0.8 * t.axis * t.budget.chord) return false;
-  }
-  return true;
-}
-
-// Blocks of block_time, shorter where a straight joint motion leaves the plan; all of them slower
-// when one would be shorter than the controller takes.
 void StretchPlanner::sample(PlannedStretch& out) {
-  const double last = grid_.knots.last();
-  const double usual = machine_.dialect.block_time * rate_of(feed_);
-  std::vector<double> stops;  // parameters that have to be ends of blocks
+  std::vector<double> stops;
   for (const PathEvent& e : in_.laser.reference.path().events)
     if (e.point >= in_.range.first && e.point < in_.range.last)
-      stops.push_back(path_.end_of(static_cast<std::uint32_t>(e.point)) / path_.length() * last);
-  stops.push_back(last);
-  const auto add = [&](double u, const JointVector& q, double step) {
-    JointSample s;
-    const PathPlace at = path_.place(std::min(path_.length(), length_at(u)));
-    s.segment = at.segment;
-    s.s = at.s;
-    s.branch = base_[first_sample_].branch;
-    s.q = q;
-    s.time = step;  // in pieces until the feed is known
-    out.samples.push_back(std::move(s));
-  };
-  double u = 0.0, shortest = INFINITY;
-  JointVector from = joints(0.0);
-  JointSample start = base_[first_sample_];
-  start.q = from;
-  out.samples.push_back(start);
-  for (const double stop : stops) {
-    while (u < stop - 1e-9) {
-      const double rest = stop - u;
-      double step = rest / std::ceil(rest / usual - 1e-9);
-      JointVector to = joints(u + step);
-      while (step > 1e-4 && !chord_holds(u, u + step, from, to)) {
-        step *= 0.5;
-        to = joints(u + step);
-      }
-      if (rest - step < 1e-9) step = rest;
-      shortest = std::min(shortest, step);
-      u = rest - step < 1e-9 ? stop : u + step;
-      add(u, to, step);
-      from = to;
-    }
-  }
-  const double allowed = shortest / machine_.cycle.min_block;
-  double rate = rate_of(feed_);
-  if (rate > allowed && shortest < usual * (1.0 - 1e-6)) {
-    feed_ *= allowed / rate;
-    rate = allowed;
+      stops.push_back(out.path.parameter_at(path_.end_of(static_cast<std::uint32_t>(e.point))));
+  stops.push_back(out.path.last());
+  LaserSamples samples = sample_path({out.path, path_, in_.laser.pair, machine_, tool_length(),
+                                      base_[first_sample_], std::move(stops)},
+                                     rate_of(feed_));
+  if (samples.rate < rate_of(feed_)) {
+    feed_ *= samples.rate / rate_of(feed_);
     note_slow("blocks of cycle.min_block_ms that keep tolerance.budget.chord", 0.0);
   }
-  for (std::size_t i = 1; i < out.samples.size(); ++i) out.samples[i].time /= rate;
-}
-
-// ---- what was found
-
-void StretchPlanner::measure(PlannedStretch& out) const {
-  const double rate = rate_of(feed_);
-  const double du = 1.0 / kMeasures;
-  std::vector<JointPeaks> peaks(static_cast<std::size_t>(machine_.size()));
-  const int steps = kMeasures * grid_.knots.spans();
-  for (int k = 0; k <= steps; ++k) {
-    const double u = std::min(grid_.knots.last(), k * du);
-    const std::uint32_t line = path_.line(std::min(path_.length(), length_at(u)));
-    const LinearsByStandoff l = linears_by_standoff(head_, tip_jet(tip_.curve, u),
-                                                    jet_of(rotary_, 0, u), jet_of(rotary_, 1, u));
-    const auto see = [&](int joint, const Jet& jet) {
-      JointPeaks& p = peaks[static_cast<std::size_t>(joint)];
-      const double v = std::abs(jet[1]) * rate, a = std::abs(jet[2]) * rate * rate,
-                   j = std::abs(jet[3]) * rate * rate * rate;
-      if (v > p.velocity) p.velocity = v, p.velocity_line = line;
-      if (a > p.acceleration) p.acceleration = a, p.acceleration_line = line;
-      if (j > p.jerk) p.jerk = j, p.jerk_line = line;
-      p.jerk_square_integral += (k == 0 || k == steps ? 0.5 : 1.0) * j * j * du / rate;
-    };
-    const Jet q6 = jet_of(standoff_, 0, u);
-    see(in_.laser.pair.first_rotary(), jet_of(rotary_, 0, u));
-    see(in_.laser.pair.second_rotary(), jet_of(rotary_, 1, u));
-    see(head_.standoff, q6);
-    for (int i = 0; i < 3; ++i)
-      see(head_.linear[static_cast<std::size_t>(i)], linear_jet(l, i, q6));
-  }
-  out.report.peaks = std::move(peaks);
+  out.samples = std::move(samples.samples);
+  out.u = std::move(samples.u);
 }
 
 // ---- messages

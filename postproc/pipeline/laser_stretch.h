@@ -18,9 +18,11 @@ struct StretchInput {
   StretchRange range;
 };
 
-/// Joint samples behind the start of a stretch (the first is its start), and what was found.
+/// Joint samples of a stretch (the first is its start), and what was found.
 struct PlannedStretch {
+  LaserJointPath path;
   std::vector<JointSample> samples;
+  std::vector<double> u;  ///< of the path, one a sample
   LaserStretch report;
 };
 
@@ -45,8 +47,17 @@ class StretchPlanner {
     std::vector<std::array<double, 2>> programmed;  ///< rotaries of the programmed axis, unwound
   };
 
+  /// By how much the linear axes and the standoff need it slower than feed_, and which most.
+  struct SlowJoint {
+    bool found = false;
+    double factor = 1.0;
+    int joint = -1, derivative = 0;
+    double place = 0.0;
+  };
+
   Grid grid(double spacing, int every) const;
-  bool fit(double spacing, int every);
+  bool fit_any();
+  bool fit(double spacing, int every, bool explain = false);
   void seed_rotaries(Grid& grid) const;
   double normal_step(const Grid& grid, std::size_t i, const Vec3& normal) const;
   OrientationWindow window(const Grid& grid, std::size_t i) const;
@@ -57,22 +68,23 @@ class StretchPlanner {
   StandoffOptions standoff_options(double rate) const;
   bool standoff_is_held() const;
   SplineCurve held_standoff() const;
-  double held_time(double rate) const;
   std::optional<Diagnostic> find_feed();
   std::optional<Diagnostic> settle();
+  std::optional<Diagnostic> finish(RotaryResult rotaries);
   std::optional<Diagnostic> solve_standoff(double rate);
+  SlowJoint slow_joint() const;
   bool keeps_to_input() const;
   Diagnostic not_smooth() const;
   Diagnostic no_orientation(const QpFeasibility& why) const;
   Diagnostic too_fast(double factor) const;
   Diagnostic broke(const char* what, const QpSolution& solution) const;
   void note_slow(const std::string& why, double u);
-  JointVector joints(double u) const;
-  CutterLocation wanted(double u) const;
-  bool chord_holds(double from, double to, const JointVector& a, const JointVector& b) const;
+  LaserJointPath joint_path(SplineCurve standoff) const;
   void sample(PlannedStretch& out);
-  void measure(PlannedStretch& out) const;
   void tell(const char* name, const QpSolution& solution);
+  double tool_length() const {
+    return in_.laser.reference.path().points[in_.range.first].tool_length;
+  }
   double rate_of(double feed) const { return feed / path_.length() * grid_.knots.spans(); }
   double length_at(double u) const { return u / grid_.knots.spans() * path_.length(); }
 
@@ -86,8 +98,9 @@ class StretchPlanner {
   Grid grid_;
   TipFit tip_;
   SplineCurve rotary_, standoff_;
-  std::optional<SplineCurve> near_;  ///< rotaries that were found before, to start from
-  double feed_ = 0.0;                ///< mm/s
+  std::optional<SplineCurve> near_;   ///< rotaries that were found before, to start from
+  std::optional<RotaryResult> here_;  ///< of optimise_rotaries() at feed_, where it is known
+  double feed_ = 0.0;                 ///< mm/s
   LaserStretch report_;
 };
 

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 #include <stdexcept>
 
 namespace smoothpost::test {
@@ -60,6 +61,18 @@ std::string read_bytes(const fs::path& path) {
   while ((n = fread(buffer, 1, sizeof buffer, pipe)) > 0) bytes.append(buffer, n);
   pclose(pipe);
   return bytes;
+}
+
+std::vector<std::vector<double>> number_table(const fs::path& path) {
+  std::vector<std::vector<double>> rows;
+  std::istringstream text(read_bytes(path));
+  for (std::string line; std::getline(text, line);) {
+    if (line.empty() || std::string("-0123456789").find(line[0]) == std::string::npos) continue;
+    std::istringstream cells(line);
+    rows.emplace_back();
+    for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(std::stod(cell));
+  }
+  return rows;
 }
 
 }  // namespace smoothpost::test

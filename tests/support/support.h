@@ -23,4 +23,8 @@ std::vector<std::filesystem::path> corpus_files(std::string_view folder,
 /// The bytes of a file; of the unpacked content when only `<path>.gz` exists or path ends in .gz.
 std::string read_bytes(const std::filesystem::path& path);
 
+/// The numbers of a file of lines with commas, one row a line; lines that do not start with a
+/// number (headings, comments) are left out.
+std::vector<std::vector<double>> number_table(const std::filesystem::path& path);
+
 }  // namespace smoothpost::test

@@ -28,24 +28,12 @@ struct Path {
   int size() const { return static_cast<int>(points.size()); }
 };
 
-/// Numbers of a file of lines with commas; lines that are no numbers left out.
-std::vector<std::vector<double>> table(const std::filesystem::path& path) {
-  std::vector<std::vector<double>> rows;
-  std::istringstream text(test::read_bytes(path));
-  for (std::string line; std::getline(text, line);) {
-    if (line.empty() || std::string("-0123456789").find(line[0]) == std::string::npos) continue;
-    std::istringstream cells(line);
-    rows.emplace_back();
-    for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(std::stod(cell));
-  }
-  return rows;
-}
-
 std::optional<Path> shared_case(const std::string& name) {
   const auto file = test::shared_path("reference/" + name);
   if (!file) return std::nullopt;
   Path path;
-  for (const auto& r : table(*file)) path.add(Vec3(r[0], r[1], r[2]), Vec3(r[3], r[4], r[5]));
+  for (const auto& r : test::number_table(*file))
+    path.add(Vec3(r[0], r[1], r[2]), Vec3(r[3], r[4], r[5]));
   return path;
 }
 
@@ -292,7 +280,7 @@ TEST_CASE("rotary_jerk: Case 2 without limits", "[kernels][optimise][paper]") {
     return;
   }
   std::vector<double> via;
-  for (const auto& row : table(*file)) via.push_back(row[0]);
+  for (const auto& row : test::number_table(*file)) via.push_back(row[0]);
   REQUIRE(via.size() == 10);
 
   Case cone(*path, 157, 15.0 * kDegree, 10.0 * kDegree);

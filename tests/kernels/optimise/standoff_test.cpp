@@ -209,19 +209,6 @@ Stretch upright(const std::function<double(double)>& f) {
   return stretch;
 }
 
-/// Numbers of a file of lines with commas, lines that are no numbers left out.
-std::vector<std::vector<double>> table(const std::filesystem::path& path) {
-  std::vector<std::vector<double>> rows;
-  std::istringstream text(test::read_bytes(path));
-  for (std::string line; std::getline(text, line);) {
-    if (line.empty() || std::string("-0123456789").find(line[0]) == std::string::npos) continue;
-    std::istringstream cells(line);
-    rows.emplace_back();
-    for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(std::stod(cell));
-  }
-  return rows;
-}
-
 constexpr double kCaseLength = 627.5;  // mm
 
 /// Case 2 of the shared reference: the rotaries of the cone programme and a least-squares quintic
@@ -232,11 +219,11 @@ std::optional<Stretch> case2(double l0) {
   if (!rotaries || !points) return std::nullopt;
   Stretch stretch{test::laser(l0), {}, {}, {}};
   stretch.head = *HeadGeometry::from(stretch.chain);
-  const auto angles = table(*rotaries);
+  const auto angles = test::number_table(*rotaries);
   const int n = static_cast<int>(angles.size());
   stretch.rotary = {clamped_knots(5, n - 5), Eigen::MatrixXd(2, n)};
   for (int j = 0; j < n; ++j) stretch.rotary.controls.col(j) << angles[j][0], angles[j][1];
-  const auto tips = table(*points);
+  const auto tips = test::number_table(*points);
   const int count = static_cast<int>(tips.size());
   SplineKnots knots = clamped_knots(5, 152);
   for (double& u : knots.values)
@@ -299,7 +286,7 @@ TEST_CASE("standoff: limits hold on a dense grid", "[kernels][optimise]") {
   CHECK(kkt < 1e-8);
   CHECK(worst.range < 1e-6);
   CHECK(worst.standoff < 1.0 + 1e-6);
-  CHECK(worst.linear < 1.01);
+  CHECK(worst.linear <= 1.0);
   CHECK(worst.linear > 0.97);  // or the limits were not tight
 }
 

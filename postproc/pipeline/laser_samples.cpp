@@ -1,0 +1,95 @@
+#include "postproc/pipeline/laser_samples.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace smoothpost {
+
+namespace {
+
+constexpr int kMeasures = 8;         // places a piece where peaks are looked for
+constexpr double kUsed = 0.8;        // of the chord share: it is looked at in quarters alone
+constexpr double kSamePlace = 1e-9;  // of u
+
+bool chord_holds(const LaserSampling& in, double from, double to, const JointVector& a,
+                 const JointVector& b) {
+  const auto& t = in.machine.tolerance;
+  for (const double share : {0.25, 0.5, 0.75}) {
+    const CutterLocation want = in.path.tool(from + share * (to - from));
+    const JointVector q = a + share * (b - a);
+    const CutterLocation holder = forward_location(in.pair.chain(), q);
+    const Vec3 tip = holder.tip - in.tool_length * holder.axis;
+    if ((tip - want.tip).norm() > kUsed * t.tip * t.budget.chord) return false;
+    if ((holder.axis - want.axis).norm() > kUsed * t.axis * t.budget.chord) return false;
+  }
+  return true;
+}
+
+void add(const LaserSampling& in, double u, const JointVector& q, LaserSamples& out) {
+  const PathPlace at = in.places.place(std::min(in.places.length(), in.path.length_at(u)));
+  JointSample s;
+  s.segment = at.segment;
+  s.s = at.s;
+  s.branch = in.start.branch;
+  s.q = q;
+  out.samples.push_back(std::move(s));
+  out.u.push_back(u);
+}
+
+}  // namespace
+
+LaserSamples sample_path(const LaserSampling& in, double rate) {
+  LaserSamples out;
+  const double usual = in.machine.dialect.block_time * rate;
+  double u = in.path.first(), shortest = INFINITY;
+  JointVector from = in.path.joints(u);
+  out.samples.push_back(in.start);
+  out.samples.back().q = from;
+  out.u.push_back(u);
+  for (const double stop : in.stops) {
+    while (u < stop - kSamePlace) {
+      const double rest = stop - u;
+      double step = rest / std::ceil(rest / usual - 1e-9);
+      JointVector to = in.path.joints(u + step);
+      while (step > 1e-4 && !chord_holds(in, u, u + step, from, to)) {
+        step *= 0.5;
+        to = in.path.joints(u + step);
+      }
+      if (rest - step < kSamePlace) step = rest;
+      shortest = std::min(shortest, step);
+      u = rest - step < kSamePlace ? stop : u + step;
+      add(in, u, to, out);
+      from = to;
+    }
+  }
+  const double allowed = shortest / in.machine.cycle.min_block;
+  out.rate = rate > allowed && shortest < usual * (1.0 - 1e-6) ? allowed : rate;
+  for (std::size_t i = 1; i < out.samples.size(); ++i)
+    out.samples[i].time = (out.u[i] - out.u[i - 1]) / out.rate;
+  return out;
+}
+
+std::vector<JointPeaks> peaks_of(const LaserJointPath& path, const StretchPath& places,
+                                 double rate) {
+  const int steps = kMeasures * path.rotary.knots.spans();
+  const double du = (path.last() - path.first()) / steps;
+  std::vector<JointPeaks> peaks(static_cast<std::size_t>(path.held.size()));
+  for (int k = 0; k <= steps; ++k) {
+    const double u = k == steps ? path.last() : path.first() + k * du;
+    const std::uint32_t line = places.line(std::min(places.length(), path.length_at(u)));
+    const JointJet jet = path.jet(u);
+    for (std::size_t joint = 0; joint < peaks.size(); ++joint) {
+      JointPeaks& p = peaks[joint];
+      const auto row = static_cast<Eigen::Index>(joint);
+      const double v = std::abs(jet(row, 1)) * rate, a = std::abs(jet(row, 2)) * rate * rate,
+                   j = std::abs(jet(row, 3)) * rate * rate * rate;
+      if (v > p.velocity) p.velocity = v, p.velocity_line = line;
+      if (a > p.acceleration) p.acceleration = a, p.acceleration_line = line;
+      if (j > p.jerk) p.jerk = j, p.jerk_line = line;
+      p.jerk_square_integral += (k == 0 || k == steps ? 0.5 : 1.0) * j * j * du / rate;
+    }
+  }
+  return peaks;
+}
+
+}  // namespace smoothpost
