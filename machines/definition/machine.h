@@ -111,7 +111,7 @@ struct RecipeSettings {
   std::string orientation = "programmed";
   std::string optimise = "none";
   std::string solver = "hybrid";
-  std::string schedule = "programmed";
+  std::string schedule = "jerk";  ///< jerk | constant | programmed
   int knot_every = 4;
   /// mm along each cut, ascending, of the via points of orientation "via"; empty: found from the
   /// path

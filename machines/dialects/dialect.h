@@ -47,10 +47,12 @@ struct MachineMove {
   double to_share = 1.0;           ///< role path: share of segment
   double blend = 0.0;              ///< mm: the control may round the corner at the end of this move
                                    ///< within this distance of it; 0: exact
-  bool spline = false;       ///< interpolation tool: one of a chain of moves whose ends the control
-                             ///< joins by a smooth curve of its own
-  double duration = 0.0;     ///< s; 0 for a rapid
-  double tool_length = 0.0;  ///< mm, of the tool in the holder
+  bool spline = false;    ///< interpolation tool: one of a chain of moves whose ends the control
+                          ///< joins by a smooth curve of its own
+  double duration = 0.0;  ///< s; 0 for a rapid
+  std::int32_t stretch = -1;  ///< role path: number of the stretch of the feed schedule; −1: none
+  double stretch_time = 0.0;  ///< s, of that stretch at the end of the move
+  double tool_length = 0.0;   ///< mm, of the tool in the holder
 };
 
 /// What happens before move `before` (or at the end when before == moves.size()).

@@ -90,7 +90,7 @@ void add_convert(CLI::App& app, CommandLine& l) {
   c->add_option("--orientation", l.orientation,
                 "programmed | cone | via | monotone (the last three: lasers)");
   c->add_option("--optimise", l.optimise, "jerk (lasers) | none");
-  c->add_option("--schedule", l.schedule, "constant (lasers, with --optimise jerk) | programmed");
+  c->add_option("--schedule", l.schedule, "jerk (default) | constant | programmed");
   c->add_option("--links", l.links,
                 "plan (default): motion between cuts is ours | keep: the input's");
   c->add_option("--cuts", l.cuts, "7, 7-40 or 7-: only these cuts, with a start of their own");

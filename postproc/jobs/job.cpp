@@ -18,7 +18,7 @@
 #include "postproc/pipeline/convert.h"
 #include "postproc/pipeline/hash.h"
 #include "postproc/pipeline/registry.h"
-#include "postproc/pipeline/trajectory.h"
+#include "postproc/pipeline/timeline.h"
 #include "postproc/report/report_json.h"
 
 namespace smoothpost {
@@ -45,6 +45,7 @@ class Run {
     if (!refuse_later_options() || !load_output_machine() || !load_input()) return finish();
     ConvertInput in;
     if (!read_convert_input(in)) return finish();
+    in.timed = !options_.trajectory.empty();
     std::optional<Conversion> made;
     if (automatic())
       made = convert_at_best_place(in, options_.force);
@@ -57,8 +58,9 @@ class Run {
     context_.cutter_locations = in.input.path.points.size();
     context_.input_lines = in.input.lines;
     report(conversion);
-    if (!options_.trajectory.empty() && !conversion.read.moves.empty())
-      result_.trajectory = trajectory_csv(conversion.read, machine_.definition, chain, tool_length);
+    if (in.timed && !conversion.timeline.items.empty())
+      result_.trajectory =
+          trajectory_csv(conversion.timeline, machine_.definition, chain, tool_length);
     result_.line_map = line_map_json(conversion.line_map, base_name(input_name_));
     if (conversion.verdict == Verdict::certified || conversion.verdict == Verdict::forced)
       result_.program = conversion.program;

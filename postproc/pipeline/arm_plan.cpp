@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 
 #include "kernels/core/units.h"
 #include "kernels/kinematics/arm_tracking.h"
@@ -34,9 +35,13 @@ Mat3 least_rotation(const Vec3& a, const Vec3& b) {
 
 class ArmPlanner {
  public:
-  ArmPlanner(const SmoothedPath& path, const SixR& arm, const Inverse& inverse,
-             const JointPlanSettings& settings, const Progress& progress)
-      : path_(path), arm_(arm), inverse_(inverse), settings_(settings), progress_(progress) {}
+  ArmPlanner(const SmoothedPath& path, const SixR& arm, const JointPlanSettings& settings,
+             const Progress& progress)
+      : path_(path),
+        arm_(arm),
+        inverse_(*Inverse::from(arm.chain())),
+        settings_(settings),
+        progress_(progress) {}
 
   /// With the first spin, best first, that has a way without a split; as the best one ends if none.
   Result<JointPlan> run() {
@@ -60,6 +65,11 @@ class ArmPlanner {
       if (!first || (plan.ok() && !first->ok())) first = std::move(plan);
     }
     return std::move(*first);
+  }
+
+  std::optional<JointVector> joints_on_leg(std::size_t leg, double share,
+                                           const JointVector& near) const {
+    return inverse_.nearest(holder(leg, share, spin_), near);
   }
 
  private:
@@ -213,11 +223,12 @@ class ArmPlanner {
     }
     JointPlan plan;
     plan.singular = singular_places();
-    if (settings_.tool_moves)
-      drop_guides(samples_, [this](const JointSample& a, const JointSample& b) {
-        return (a.q - b.q).cwiseAbs().maxCoeff() < kLongestTurn && follows(a, b);
-      });
+    drop_guides(samples_, [this](const JointSample& a, const JointSample& b) {
+      return (a.q - b.q).cwiseAbs().maxCoeff() < kLongestTurn && follows(a, b);
+    });
     for (JointSample& sample : samples_) {
+      sample.leg = sample.segment;
+      sample.leg_share = sample.s;
       const PathPlace on_input = path_.place(sample.segment, sample.s);
       sample.segment = on_input.segment;
       sample.s = on_input.s;
@@ -246,7 +257,10 @@ class ArmPlanner {
     for (std::size_t k = 1; k <= path_.legs(); ++k) {
       if (!replanned(k)) {
         const std::vector<double> breaks = path_.breaks(k);
-        for (std::size_t b = 1; b < breaks.size(); ++b) subdivide(k, breaks[b - 1], breaks[b], 0);
+        for (std::size_t b = 1; b < breaks.size(); ++b) {
+          subdivide(k, breaks[b - 1], breaks[b], 0);
+          tracked_.back().guide = b + 1 < breaks.size();
+        }
       } else if (k < path_.legs() && !replanned(k + 1))
         add(k, 1.0);
     }
@@ -407,8 +421,8 @@ class ArmPlanner {
 
   const SmoothedPath& path_;
   const SixR& arm_;
-  const Inverse& inverse_;
-  const JointPlanSettings& settings_;
+  const Inverse inverse_;
+  const JointPlanSettings settings_;
   const Progress& progress_;
   Vec3 reference_axis_ = Vec3::UnitZ();
   Mat3 from_input_ = Mat3::Identity();
@@ -425,8 +439,13 @@ class ArmPlanner {
 
 Result<JointPlan> plan_arm(const SmoothedPath& path, const SixR& arm,
                            const JointPlanSettings& settings, const Progress& progress) {
-  const auto inverse = Inverse::from(arm.chain());
-  return ArmPlanner(path, arm, *inverse, settings, progress).run();
+  const auto planner = std::make_shared<ArmPlanner>(path, arm, settings, progress);
+  Result<JointPlan> plan = planner->run();
+  if (plan.ok())
+    plan.value().joints_on_leg = [planner](std::size_t leg, double share, const JointVector& near) {
+      return planner->joints_on_leg(leg, share, near);
+    };
+  return plan;
 }
 
 }  // namespace smoothpost

@@ -95,14 +95,47 @@ void describe_promises(const MachineDefinition& machine, bool has_part, Conversi
         "the limits of these axes are assumed, not from a datasheet, and used at 90 %: " + assumed);
 }
 
+namespace {
+
+// A beam that goes slower than its material takes, and what keeps it so.
+void add_cut_speed(const MachineDefinition& machine, Conversion& out) {
+  const double limit = machine.power.min_cut_speed;
+  if (!(limit > 0.0) || !std::isfinite(out.schedule.slowest_cut)) return;
+  Check c;
+  c.name = "min_cut_speed";
+  c.unit = "mm/s";
+  c.value = out.schedule.slowest_cut;
+  c.limit = limit;
+  c.ok = c.value >= c.limit;
+  c.planned = true;
+  c.input_line = out.schedule.slowest_cut_line;
+  c.note = "from below: the slowest place with the beam on, ramps at stops left out";
+  for (const SlowedBy& s : out.schedule.slowed_by)
+    if (s.first_line <= c.input_line && c.input_line <= s.last_line)
+      c.note += "; axis " + machine.axes[static_cast<std::size_t>(s.joint)].name + " at its " +
+                word(s.limit) + " limit";
+  out.checks.push_back(c);
+}
+
+}  // namespace
+
 void add_planned_limits(const MachineDefinition& machine, Conversion& out) {
-  if (out.stretches.empty()) return;
-  const Checks checks = planned_limit_checks(out.stretches, machine, out.axes);
+  if (out.schedule.peaks.empty()) return;
+  const Checks checks =
+      planned_limit_checks(out.schedule.peaks, out.schedule.time, machine, out.axes);
   out.checks.insert(out.checks.end(), checks.begin(), checks.end());
   std::erase_if(out.not_checked, [](const std::string& name) {
     return name == "acceleration_limit" || name == "jerk_limit";
   });
   out.assumes.push_back(planned_limits_assumption());
+  add_cut_speed(machine, out);
+  for (std::size_t j = 0; j < machine.axes.size(); ++j) {
+    const bool rotary = machine.axes[j].joint.kind == JointKind::rotary;
+    const int digits = rotary ? machine.dialect.digits_angle : machine.dialect.digits_length;
+    const double unit =
+        (rotary || machine.dialect.units != "inch" ? 1.0 : 25.4) * std::pow(10.0, -digits);
+    out.axes[j].rounding_jerk = 4.0 * unit / std::pow(machine.cycle.min_block, 3);
+  }
 }
 
 PartCheck::InputRegistration PartCheck::input(const ReferencePath& reference) const {

@@ -82,8 +82,8 @@ Result<ControllerMotion> follow(ReadBack read, const MachineDefinition& machine,
                                 const Inverse& inverse, ToolTurn turn,
                                 const std::function<double(std::size_t)>& tool_length);
 
-/// Adds the checks of the accelerations and jerks that out.stretches have planned
-/// (planned_limit_checks) and what they rest on; does nothing without stretches.
+/// Adds the checks of the accelerations and jerks of out.schedule (planned_limit_checks) and what
+/// they rest on; does nothing without a schedule.
 void add_planned_limits(const MachineDefinition& machine, Conversion& out);
 
 /// What a certificate takes for granted and does not check, whatever the program.

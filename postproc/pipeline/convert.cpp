@@ -293,6 +293,7 @@ class Converter {
     out_.merged_points = smoothed_->merged_points();
     watch_.lap("corners");
     tell_posture(planned.value());
+    if (!schedule(planned.value())) return false;
     BuiltProgram built =
         build_program({reference_, cuts_, in_.machine, chain_, part_box(), turn_, &*inverse_},
                       planned.value().samples);
@@ -315,6 +316,8 @@ class Converter {
     if (!tools_are_possible()) return false;
     program_.title = in_.title;
     program_.certified = true;
+    if (in_.timed)
+      out_.timeline = timeline_of({program_, out_.schedule, in_.machine, chain_, *inverse_, turn_});
     return true;
   }
 
@@ -353,6 +356,19 @@ class Converter {
     return plan_arm(*smoothed_, *inverse_->six_r(), settings, progress_);
   }
 
+  // The time of the way to every sample.
+  bool schedule(JointPlan& plan) {
+    auto scheduled = schedule_plan(
+        {{*smoothed_, plan, laser_paths_, in_.machine}, cuts_, in_.input_name}, progress_);
+    append(out_.diagnostics, scheduled.diagnostics());
+    watch_.lap("schedule");
+    if (!scheduled.ok()) return false;
+    out_.schedule = std::move(scheduled.value());
+    append(out_.diagnostics, schedule_notes(out_.schedule, in_.machine, in_.input_name));
+    plan.samples = timed_samples(std::move(plan.samples), out_.schedule);
+    return true;
+  }
+
   bool optimises() const {
     return in_.machine.recipe.optimise == "jerk" && in_.machine.recipe.kind == "laser";
   }
@@ -366,11 +382,11 @@ class Converter {
     watch_.lap("optimise");
     if (!result.ok()) return Result<JointPlan>::failure(result.diagnostics());
     out_.stretches = std::move(result.value().stretches);
-    const Diagnostics warnings = result.diagnostics();
-    if (!warnings.empty() && !out_.stretches.empty())
-      out_.not_checked.push_back("acceleration_limit and jerk_limit of stretches not optimised");
+    laser_paths_ = std::move(result.value().paths);
     tell_stretches();
-    return Result<JointPlan>(std::move(result.value().joints), warnings);
+    JointPlan plan = std::move(base);
+    plan.samples = std::move(result.value().joints.samples);
+    return Result<JointPlan>(std::move(plan), result.diagnostics());
   }
 
   // What was slowed down, and what the standoff may not do.
@@ -381,7 +397,7 @@ class Converter {
       out_.diagnostics.back().severity = Severity::note;
     };
     for (const LaserStretch& stretch : out_.stretches)
-      if (!stretch.slowed_by.empty())
+      if (!stretch.slowed_by.empty() && in_.machine.recipe.schedule == "constant")
         note("KN155",
              "cut at " + number(stretch.feed * kSecondsPerMinute) + " mm/min instead of " +
                  number(stretch.programmed_feed * kSecondsPerMinute) + " for " + stretch.slowed_by,
@@ -638,6 +654,7 @@ class Converter {
   std::vector<std::uint32_t> split_lines_;
   std::optional<SmoothedPath> smoothed_;
   std::optional<TuningResult> tuned_;
+  std::vector<LaserPlanPath> laser_paths_;
   std::optional<PartCheck> part_;
   std::optional<Inverse> inverse_;
   const Dialect* dialect_ = nullptr;

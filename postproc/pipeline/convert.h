@@ -7,10 +7,12 @@
 #include "kernels/core/mesh.h"
 #include "kernels/core/progress.h"
 #include "postproc/pipeline/cuts.h"
+#include "postproc/pipeline/feed_schedule.h"
 #include "postproc/pipeline/interpret.h"
 #include "postproc/pipeline/laser_plan.h"
 #include "postproc/pipeline/line_map.h"
 #include "postproc/pipeline/smoothed_path.h"
+#include "postproc/pipeline/timeline.h"
 #include "postproc/pipeline/verify.h"
 
 namespace smoothpost {
@@ -28,6 +30,7 @@ struct ConvertInput {
   std::vector<std::string> title;  ///< comment lines at the top of the program
   bool keep_links = false;         ///< --links keep: rapids stay as the input has them
   std::optional<CutRange> cuts;    ///< --cuts: the others are left out
+  bool timed = false;              ///< make Conversion::timeline
 };
 
 enum class Verdict { certified, limits_only, refused, forced };
@@ -69,6 +72,8 @@ struct Conversion {
   std::vector<CutSummary> cuts;
   std::vector<SmoothedCorner> corners;
   std::vector<LaserStretch> stretches;  ///< of optimise = "jerk", in path order
+  FeedSchedule schedule;
+  Timeline timeline;  ///< empty unless ConvertInput::timed
   std::uint32_t merged_points = 0;
   std::size_t links = 0;
   std::size_t blocks = 0;

@@ -107,6 +107,7 @@ void compensate_latency(MachineProgram& program, const MachineDefinition& machin
         begin(part, place_on(reference, whole, done));
         end(part, place_on(reference, whole, place.share));
         part.duration = (place.share - done) * whole.duration;
+        part.stretch_time = whole.stretch_time - (1.0 - place.share) * whole.duration;
         moves.push_back(std::move(part));
         done = place.share;
       }

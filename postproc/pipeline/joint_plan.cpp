@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "kernels/core/units.h"
 #include "kernels/kinematics/branch_tracking.h"
@@ -57,17 +58,28 @@ class Planner {
         return Result<JointPlan>::failure(plan_cancelled());
     }
     JointPlan plan;
-    if (settings_.tool_moves)
-      drop_guides(samples_, [this](const JointSample& a, const JointSample& b) {
-        return tool_takes_joints(a, b) && follows_by_tool(a, b);
-      });
+    drop_guides(samples_, [this](const JointSample& a, const JointSample& b) {
+      return settings_.tool_moves ? tool_takes_joints(a, b) && follows_by_tool(a, b)
+                                  : follows(a, b);
+    });
     for (JointSample& sample : samples_) {
+      sample.leg = sample.segment;
+      sample.leg_share = sample.s;
       const PathPlace on_input = path_.place(sample.segment, sample.s);
       sample.segment = on_input.segment;
       sample.s = on_input.s;
     }
     plan.samples = std::move(samples_);
     return Result<JointPlan>(std::move(plan));
+  }
+
+  std::optional<JointVector> joints_on_leg(std::size_t leg, double share,
+                                           const JointVector& near) const {
+    JointSample there;
+    there.segment = static_cast<std::uint32_t>(leg);
+    there.s = share;
+    if (!place(there, near, 1.0)) return {};
+    return there.q;
   }
 
  private:
@@ -101,9 +113,11 @@ class Planner {
     for (std::size_t k = 1; k <= path_.legs(); ++k) {
       if (!replanned(k)) {
         const std::vector<double> breaks = path_.breaks(k);
-        for (std::size_t b = 1; b < breaks.size(); ++b)
+        for (std::size_t b = 1; b < breaks.size(); ++b) {
           subdivide(k, {breaks[b - 1], target(k, breaks[b - 1])}, {breaks[b], target(k, breaks[b])},
                     0);
+          tracked_.back().guide = b + 1 < breaks.size();
+        }
       } else if (k < path_.legs() && !replanned(k + 1)) {
         add_tracked(k, 1.0, target(k, 1.0));
       }
@@ -304,7 +318,7 @@ class Planner {
 
   const SmoothedPath& path_;
   const RotaryPair& pair_;
-  const JointPlanSettings& settings_;
+  const JointPlanSettings settings_;
   const Progress& progress_;
   Vec3 pole_;
   double cap_ = 0.0;
@@ -321,7 +335,13 @@ CutterLocation holder_location(const CutterLocation& tip, double tool_length) {
 
 Result<JointPlan> plan_joints(const SmoothedPath& path, const RotaryPair& pair,
                               const JointPlanSettings& settings, const Progress& progress) {
-  return Planner(path, pair, settings, progress).run();
+  const auto planner = std::make_shared<Planner>(path, pair, settings, progress);
+  Result<JointPlan> plan = planner->run();
+  if (plan.ok())
+    plan.value().joints_on_leg = [planner](std::size_t leg, double share, const JointVector& near) {
+      return planner->joints_on_leg(leg, share, near);
+    };
+  return plan;
 }
 
 }  // namespace smoothpost

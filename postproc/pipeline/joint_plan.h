@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -33,15 +34,24 @@ struct JointSample {
   double s = 1.0;
   int branch = 0;
   JointVector q;
-  bool guide = false;      ///< inside a piece of one formula: there for the choice of the joints
+  bool guide = false;      ///< there for the choice of the joints, or at a break inside a leg
   bool by_joints = false;  ///< with tool moves: the way here is straight in the joints all the same
-  double time = 0.0;       ///< s, of the way here where it was planned (laser_plan); else 0
+  double time = 0.0;       ///< s, of the way here where it was planned (feed_schedule); else 0
+  std::int32_t stretch = -1;  ///< of the schedule, that the way here is on; −1: none
+  double stretch_time = 0.0;  ///< s, of that stretch, here
+  std::uint32_t leg = 0;   ///< of the SmoothedPath that the joints were planned on, and the share
+  double leg_share = 1.0;  ///< of it, where (segment, s) is the place of the input
 };
+
+/// The joints at a share of a leg of the SmoothedPath that the samples were planned on: of all
+/// solutions the one nearest to `near`; nothing where the pose cannot be reached.
+using JointsOnLeg = std::function<std::optional<JointVector>(std::size_t leg, double share,
+                                                             const JointVector& near)>;
 
 /// A place inside a cut that has no continuous way on: the cut has to be split there.
 using SplitPlace = PathPlace;
 
-/// Drops guides that a tool move from the sample before to the one behind does without:
+/// Drops guides that a move from the sample before to the one behind does without:
 /// `follows(before, behind)`, with `before` at share 0 of the leg of `behind` if it ends another.
 template <class Follows>
 void drop_guides(std::vector<JointSample>& samples, const Follows& follows) {
@@ -77,6 +87,8 @@ struct SingularPlace {
 
 struct JointPlan {
   std::vector<JointSample> samples;
+  JointsOnLeg
+      joints_on_leg;  ///< the path, SmoothedPath and chain of the planner have to outlive it
   std::optional<SpinGain> spin_gain;
   std::vector<SingularPlace> singular;  ///< arms: the nearest of each stretch of one kind
   std::vector<SplitPlace> splits;       ///< not empty: no samples; split there and plan again

@@ -205,6 +205,8 @@ class Builder {
     move.from_segment = from.segment;
     move.from_share = from.s;
     move.to_share = to.s;
+    move.stretch = to.stretch;
+    move.stretch_time = to.stretch_time;
     if (to.time > 0.0)
       move.duration = to.time;
     else if (!move.rapid)

@@ -21,27 +21,20 @@ Check as_planned(Check c) {
 
 }  // namespace
 
-Checks planned_limit_checks(const std::vector<LaserStretch>& stretches,
+Checks planned_limit_checks(const std::vector<JointPeaks>& peaks, double time,
                             const MachineDefinition& machine, std::vector<AxisSummary>& axes) {
   require(axes.size() == machine.axes.size(), "a summary for each axis");
-  if (stretches.empty()) return {};
-  double time = 0.0;
-  for (const LaserStretch& stretch : stretches) {
-    require(stretch.peaks.size() == machine.axes.size(), "peaks of each joint");
-    if (stretch.feed > 0.0) time += stretch.length / stretch.feed;
-  }
+  if (peaks.empty()) return {};
+  require(peaks.size() == machine.axes.size(), "peaks of each joint");
   Checks accelerations, jerks;
   for (std::size_t j = 0; j < machine.axes.size(); ++j) {
     const AxisDefinition& axis = machine.axes[j];
     const double scale = axis.joint.kind == JointKind::rotary ? kDegreesPerRadian : 1.0;
     Worst acceleration, jerk;
-    double square = 0.0;
-    for (const LaserStretch& stretch : stretches) {
-      const JointPeaks& p = stretch.peaks[j];
-      acceleration.see(p.acceleration * scale, 0, 0.0, p.acceleration_line);
-      jerk.see(p.jerk * scale, 0, 0.0, p.jerk_line);
-      square += p.jerk_square_integral * scale * scale;
-    }
+    const JointPeaks& p = peaks[j];
+    acceleration.see(p.acceleration * scale, 0, 0.0, p.acceleration_line);
+    jerk.see(p.jerk * scale, 0, 0.0, p.jerk_line);
+    const double square = p.jerk_square_integral * scale * scale;
     AxisSummary& summary = axes[j];
     summary.peak_acceleration = acceleration.value();
     summary.peak_jerk = jerk.value();
@@ -56,10 +49,9 @@ Checks planned_limit_checks(const std::vector<LaserStretch>& stretches,
 }
 
 std::string planned_limits_assumption() {
-  return "acceleration and jerk are those of the plan inside the optimised stretches of the cuts, "
-         "at their constant feed: at their ends the control comes to rest as it likes, and at "
-         "level "
-         "geometry it may move otherwise in time";
+  return "acceleration and jerk are those of the feed schedule, on the way between two stops of "
+         "the "
+         "path: at level geometry the control may move otherwise in time, and links are its own";
 }
 
 }  // namespace smoothpost

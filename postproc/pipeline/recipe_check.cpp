@@ -99,11 +99,6 @@ void check_laser(const MachineDefinition& machine, Refusals& refusals) {
   const bool optimised = r.optimise == "jerk";
   if (optimised && !laser)
     refusals.refuse("recipe.optimise", r.optimise, "none (jerk is for recipe.kind = \"laser\")");
-  if (r.schedule == "jerk" || (r.schedule == "constant" && !(laser && optimised)))
-    refusals.refuse("recipe.schedule", r.schedule,
-                    laser && optimised ? "constant, programmed"
-                                       : "programmed (constant is for recipe.kind = \"laser\" with "
-                                         "recipe.optimise = \"jerk\")");
   if (laser && !optimised && r.orientation != "programmed" && r.orientation != "graph")
     refusals.refuse("recipe.optimise", r.optimise,
                     "jerk (recipe.orientation = \"" + r.orientation + "\" is planned by it)");

@@ -23,6 +23,9 @@ struct AxisSummary {
   double peak_velocity = 0.0;
   /// Of the plan, where there is one that knows them.
   std::optional<double> peak_acceleration = {}, peak_jerk = {}, rms_jerk = {};
+  /// What half a unit of the last printed digit may be in jerk at the shortest block: 8·(half
+  /// unit)/time³.
+  std::optional<double> rounding_jerk = {};
   double limit_velocity = 0.0;
   double limit_acceleration = 0.0;
   double limit_jerk = 0.0;

@@ -54,20 +54,30 @@ Json qp_json(const QpReport& q) {
           {"violation", number(q.violation)}};
 }
 
-Json slowed_json(const LaserStretch& s) {
-  // "B jerk" is the jerk limit of joint B; anything else is told as it is.
-  const auto space = s.slowed_by.find(' ');
-  const std::string limit = space == std::string::npos ? "" : s.slowed_by.substr(space + 1);
-  const bool of_joint = limit == "velocity" || limit == "acceleration" || limit == "jerk";
-  Json j;
-  j["joint"] = of_joint ? Json(s.slowed_by.substr(0, space)) : Json(nullptr);
-  j["limit"] = of_joint ? limit : s.slowed_by;
-  if (!s.slowed_lines.empty()) {
-    const auto [low, high] = std::minmax_element(s.slowed_lines.begin(), s.slowed_lines.end());
-    j["input_lines"] = {*low, *high};
+/// What keeps the cut below its programmed feed, the slowest `kMostSlowed` in path order.
+Json slowed_json(const CutSummary& cut, const Conversion& c) {
+  constexpr std::size_t kMostSlowed = 1000;
+  const auto before = [](const SlowedBy& s, std::uint32_t segment) {
+    return s.first_segment < segment;
+  };
+  const auto& all = c.schedule.slowed_by;
+  const auto begin = std::lower_bound(all.begin(), all.end(), cut.first, before);
+  std::vector<SlowedBy> shown(begin, std::lower_bound(begin, all.end(), cut.last + 1, before));
+  if (shown.size() > kMostSlowed) {
+    std::stable_sort(shown.begin(), shown.end(),
+                     [](const SlowedBy& a, const SlowedBy& b) { return a.factor < b.factor; });
+    shown.resize(kMostSlowed);
+    std::stable_sort(shown.begin(), shown.end(), [](const SlowedBy& a, const SlowedBy& b) {
+      return a.first_segment < b.first_segment;
+    });
   }
-  j["factor"] = s.programmed_feed > 0.0 ? number(s.feed / s.programmed_feed) : Json(nullptr);
-  return j;
+  Json list = Json::array();
+  for (const SlowedBy& s : shown)
+    list.push_back({{"joint", c.axes[static_cast<std::size_t>(s.joint)].name},
+                    {"limit", word(s.limit)},
+                    {"input_lines", {s.first_line, s.last_line}},
+                    {"factor", number(s.factor)}});
+  return list;
 }
 
 /// What was optimised in the cut; nothing when nothing was.
@@ -76,7 +86,6 @@ void add_stretches(const CutSummary& cut, const std::vector<LaserStretch>& stret
   bool from_part = true;
   double feed = 0.0;
   Json qp = Json::array();
-  Json slowed = Json::array();
   const auto begin =
       std::lower_bound(stretches.begin(), stretches.end(), cut.first,
                        [](const LaserStretch& s, std::uint32_t k) { return s.first < k; });
@@ -88,7 +97,6 @@ void add_stretches(const CutSummary& cut, const std::vector<LaserStretch>& stret
     passes += s.passes;
     from_part = from_part && s.normal_from_part;
     for (const QpReport& q : s.qp) qp.push_back(qp_json(q));
-    if (!s.slowed_by.empty()) slowed.push_back(slowed_json(s));
   }
   if (count == 0) return;
   j["stretches"] = count;
@@ -98,7 +106,6 @@ void add_stretches(const CutSummary& cut, const std::vector<LaserStretch>& stret
   j["normal"] = from_part ? "part" : "programmed";
   j["feed_mm_per_min"] = number(kSecondsPerMinute * feed);
   j["qp"] = std::move(qp);
-  j["slowed_by"] = std::move(slowed);
 }
 
 Json cut_json(const CutSummary& c) {
@@ -134,7 +141,7 @@ Json axis_json(const AxisSummary& a) {
           {"input_peak", nullptr},
           {"rms_jerk", known(a.rms_jerk)},
           {"input_rms_jerk", nullptr},
-          {"rounding_jerk", nullptr}};
+          {"rounding_jerk", known(a.rounding_jerk)}};
 }
 
 Json corner_json(const SmoothedCorner& c) {
@@ -234,8 +241,11 @@ std::string report_json(const Conversion& c, const ReportContext& context) {
   j["axes"] = std::move(axes);
   constexpr std::size_t kMostCuts = 10000;
   Json cuts = Json::array();
-  for (std::size_t i = 0; i < std::min(c.cuts.size(), kMostCuts); ++i)
-    add_stretches(c.cuts[i], c.stretches, cuts.emplace_back(cut_json(c.cuts[i])));
+  for (std::size_t i = 0; i < std::min(c.cuts.size(), kMostCuts); ++i) {
+    Json& cut = cuts.emplace_back(cut_json(c.cuts[i]));
+    add_stretches(c.cuts[i], c.stretches, cut);
+    if (!c.axes.empty()) cut["slowed_by"] = slowed_json(c.cuts[i], c);
+  }
   constexpr std::size_t kMostCorners = 10000;
   j["corners"] = corners_json(c.corners, kMostCorners);
   if (c.corners.size() > kMostCorners) j["corners_in_all"] = c.corners.size();

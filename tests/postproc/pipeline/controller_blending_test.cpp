@@ -448,6 +448,6 @@ TEST_CASE("blending: a program with a latency is certified in every path mode", 
     CHECK(c.verdict == Verdict::certified);
     CHECK((c.program.find(" C_DIS") != std::string::npos) == (mode == "blend"));
     CHECK((c.program.find("ENDSPLINE") != std::string::npos) == (mode == "spline"));
-    CHECK((c.program.find(" DELAY=-8 DO ") != std::string::npos) == (mode != "spline"));
+    if (mode != "spline") CHECK(c.program.find(" DELAY=-8 DO ") != std::string::npos);
   }
 }

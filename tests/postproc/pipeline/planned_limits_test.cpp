@@ -23,15 +23,6 @@ std::vector<AxisSummary> summaries(const MachineDefinition& machine) {
   return axes;
 }
 
-/// 100 mm at 50 mm/s: 2 s.
-LaserStretch stretch(const MachineDefinition& machine) {
-  LaserStretch s;
-  s.length = 100.0;
-  s.feed = 50.0;
-  s.peaks.resize(machine.axes.size());
-  return s;
-}
-
 Check get(const Checks& checks, const std::string& name) {
   for (const auto& c : checks)
     if (c.name == name) return c;
@@ -41,18 +32,17 @@ Check get(const Checks& checks, const std::string& name) {
 
 }  // namespace
 
-TEST_CASE("planned_limits: the largest of all stretches against the machine's own limit",
+TEST_CASE("planned_limits: the largest of a schedule against the machine's own limit",
           "[postproc][pipeline]") {
   const MachineDefinition machine = shipped_machine("laser_5p1");
   const auto b = static_cast<std::size_t>(machine.axis_by_name("B"));
-  LaserStretch first = stretch(machine), second = stretch(machine);
-  first.peaks[0] = {100.0, 2000.0, 30000.0, 8.0, 1, 7, 8};
-  second.peaks[0] = {100.0, 3000.0, 20000.0, 24.0, 1, 17, 18};
-  second.peaks[b].jerk = 0.5 * machine.axes[b].jerk;
-  second.peaks[b].jerk_line = 21;
-  second.peaks[b].jerk_square_integral = 9.0;
+  std::vector<JointPeaks> peaks(machine.axes.size());
+  peaks[0] = {100.0, 3000.0, 30000.0, 32.0, 1, 17, 8};
+  peaks[b].jerk = 0.5 * machine.axes[b].jerk;
+  peaks[b].jerk_line = 21;
+  peaks[b].jerk_square_integral = 9.0;
   auto axes = summaries(machine);
-  const Checks checks = planned_limit_checks({first, second}, machine, axes);
+  const Checks checks = planned_limit_checks(peaks, 4.0, machine, axes);
   CHECK(checks.size() == 2 * machine.axes.size());
   const Check acceleration = get(checks, "acceleration_limit.X");
   CHECK(acceleration.value == 3000.0);
@@ -70,7 +60,7 @@ TEST_CASE("planned_limits: the largest of all stretches against the machine's ow
   CHECK(rotary.limit == Approx(degrees_from_radians(machine.axes[b].jerk)));
   CHECK(rotary.unit == "deg/s3");
   CHECK(rotary.input_line == 21);
-  // sqrt((8 + 24) mm²/s⁵ / 4 s), sqrt(9 rad²/s⁵ / 4 s).
+  // sqrt(32 mm²/s⁵ / 4 s), sqrt(9 rad²/s⁵ / 4 s).
   CHECK(axes[0].rms_jerk == Approx(std::sqrt(8.0)));
   CHECK(axes[0].peak_acceleration == 3000.0);
   CHECK(axes[0].peak_jerk == 30000.0);
@@ -79,13 +69,13 @@ TEST_CASE("planned_limits: the largest of all stretches against the machine's ow
 
 TEST_CASE("planned_limits: beyond a limit the check fails with its line", "[postproc][pipeline]") {
   const MachineDefinition machine = shipped_machine("laser_5p1");
-  LaserStretch s = stretch(machine);
-  s.peaks[1].acceleration = machine.axes[1].acceleration;
-  s.peaks[1].jerk = 1.001 * machine.axes[1].jerk;
-  s.peaks[1].jerk_line = 33;
-  s.peaks[2].jerk = std::nan("");
+  std::vector<JointPeaks> peaks(machine.axes.size());
+  peaks[1].acceleration = machine.axes[1].acceleration;
+  peaks[1].jerk = 1.001 * machine.axes[1].jerk;
+  peaks[1].jerk_line = 33;
+  peaks[2].jerk = std::nan("");
   auto axes = summaries(machine);
-  const Checks checks = planned_limit_checks({s}, machine, axes);
+  const Checks checks = planned_limit_checks(peaks, 1.0, machine, axes);
   CHECK(get(checks, "acceleration_limit.Y").ok);
   CHECK_FALSE(get(checks, "jerk_limit.Y").ok);
   CHECK(get(checks, "jerk_limit.Y").input_line == 33);
@@ -95,11 +85,11 @@ TEST_CASE("planned_limits: beyond a limit the check fails with its line", "[post
 TEST_CASE("planned_limits: without a plan nothing is said", "[postproc][pipeline]") {
   const MachineDefinition machine = shipped_machine("laser_5p1");
   auto axes = summaries(machine);
-  CHECK(planned_limit_checks({}, machine, axes).empty());
+  CHECK(planned_limit_checks({}, 0.0, machine, axes).empty());
   CHECK_FALSE(axes[0].peak_jerk.has_value());
-  LaserStretch s = stretch(machine);
-  s.peaks.pop_back();
-  CHECK_THROWS_AS(planned_limit_checks({s}, machine, axes), ContractViolation);
+  std::vector<JointPeaks> peaks(machine.axes.size() - 1);
+  CHECK_THROWS_AS(planned_limit_checks(peaks, 1.0, machine, axes), ContractViolation);
+  peaks.emplace_back();
   axes.pop_back();
-  CHECK_THROWS_AS(planned_limit_checks({stretch(machine)}, machine, axes), ContractViolation);
+  CHECK_THROWS_AS(planned_limit_checks(peaks, 1.0, machine, axes), ContractViolation);
 }

@@ -251,7 +251,7 @@ TEST_CASE("smoothing_convert: other machines are certified with smoothing",
     const Overrides by_corners = {{"recipe.smoothing", smoothing},
                                   {"recipe.optimise", "none"},
                                   {"recipe.orientation", "programmed"},
-                                  {"recipe.schedule", "programmed"}};
+                                  {"recipe.schedule", "jerk"}};
     auto in = prepare(kLaser, "laser_5p1", "laser_5p1", by_corners);
     in.placement = shifted(700, 600, 1000);
     const Conversion c = convert(in, false, {});

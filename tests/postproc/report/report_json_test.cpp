@@ -100,8 +100,6 @@ TEST_CASE("report_json: what was optimised in a cut", "[postproc][report]") {
   a.last = 5;
   a.feed = 100.0;
   a.programmed_feed = 250.0;
-  a.slowed_by = "B jerk";
-  a.slowed_lines = {8, 6, 7};
   a.control_points = 79;
   a.via_points = 2;
   a.passes = 6;
@@ -111,8 +109,6 @@ TEST_CASE("report_json: what was optimised in a cut", "[postproc][report]") {
   b.first = 6;
   b.last = 9;
   b.feed = 200.0;
-  b.slowed_by = "the standoff's reserve";
-  b.slowed_lines.clear();
   b.qp.clear();
   d.first = 12;
   d.last = 20;
@@ -126,6 +122,9 @@ TEST_CASE("report_json: what was optimised in a cut", "[postproc][report]") {
   AxisSummary unknown;
   unknown.name = "C";
   c.axes = {axis, unknown};
+  c.schedule.slowed_by = {{0, FeedWitness::Kind::jerk, 6, 8, 0.4, 2},
+                          {1, FeedWitness::Kind::velocity, 9, 9, 0.75, 9},
+                          {1, FeedWitness::Kind::acceleration, 30, 31, 0.5, 22}};
   const auto json = nlohmann::json::parse(report_json(c, {}));
   const auto& cut = json["cuts"][0];
   CHECK(cut["stretches"] == 2);
@@ -147,11 +146,13 @@ TEST_CASE("report_json: what was optimised in a cut", "[postproc][report]") {
   CHECK(cut["slowed_by"][0]["limit"] == "jerk");
   CHECK(cut["slowed_by"][0]["input_lines"] == nlohmann::json({6, 8}));
   CHECK(cut["slowed_by"][0]["factor"] == 0.4);
-  CHECK(cut["slowed_by"][1]["joint"].is_null());
-  CHECK(cut["slowed_by"][1]["limit"] == "the standoff's reserve");
+  CHECK(cut["slowed_by"][1]["joint"] == "C");
+  CHECK(cut["slowed_by"][1]["limit"] == "velocity");
   CHECK(json["cuts"][1]["normal"] == "programmed");
   CHECK(json["cuts"][1]["slowed_by"].empty());
   CHECK_FALSE(json["cuts"][2].contains("qp"));
+  REQUIRE(json["cuts"][2]["slowed_by"].size() == 1);
+  CHECK(json["cuts"][2]["slowed_by"][0]["limit"] == "acceleration");
   CHECK(json["axes"][0]["peak"]["acceleration"] == 1.5);
   CHECK(json["axes"][0]["peak"]["jerk"] == 2.5);
   CHECK(json["axes"][0]["rms_jerk"] == 0.75);

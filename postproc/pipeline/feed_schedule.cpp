@@ -1,0 +1,475 @@
+#include "postproc/pipeline/feed_schedule.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "kernels/core/units.h"
+#include "kernels/schedule/constant_feed.h"
+#include "machines/dialects/decimal.h"
+#include "postproc/pipeline/conversion_parts.h"
+#include "postproc/pipeline/machine_program.h"
+
+namespace smoothpost {
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr int kPlaces = 24;      // of a piece, for a constant feed
+constexpr int kBlockRounds = 1;  // caps for blocks that are too short
+// Elements a quarter as long as a joint takes from no acceleration to its largest: 0.2 % slower
+// than half of that (findings of the schedule, section 3).
+constexpr double kElementShare = 0.25, kShortestElement = 0.007, kLongestElement = 0.030;
+constexpr double kBlockReserve = 1e-3;  // by which those caps are lower
+constexpr double kPeakStep = 5e-4;      // s, where peaks are looked for
+constexpr std::size_t kMostTold = 12;   // lines in a message
+constexpr double kLeastTime = 1e-4;     // s, of a block that goes nowhere
+constexpr double kNoBlock = 1e-6;       // of a stretch: no way
+constexpr double kFull = 0.995;         // of the programmed feed: not slowed
+
+/// Four significant digits.
+std::string number(double value) {
+  if (!(std::abs(value) > 0.0)) return "0";
+  const int places = 3 - static_cast<int>(std::floor(std::log10(std::abs(value))));
+  std::string text;
+  append_decimal(text, value, std::clamp(places, 0, 9));
+  return text;
+}
+
+const char* word(FeedOverload::Kind kind) {
+  switch (kind) {
+    case FeedOverload::Kind::velocity:
+      return "velocity";
+    case FeedOverload::Kind::acceleration:
+      return "acceleration";
+    default:
+      return "jerk";
+  }
+}
+
+/// A bound of ds/dt between two places.
+struct RateCap {
+  double from = 0.0, to = 0.0, rate = kInfinity;
+};
+
+class Scheduler {
+ public:
+  Scheduler(const ScheduleInput& input, const Progress& progress)
+      : in_(input),
+        machine_(input.path.machine),
+        samples_(input.path.plan.samples),
+        limits_(feed_limits(input.path.machine)),
+        progress_(progress) {
+    const double shortest = limits_.acceleration.cwiseQuotient(limits_.jerk).minCoeff();
+    element_time_ = std::clamp(kElementShare * shortest, kShortestElement, kLongestElement);
+  }
+
+  Result<FeedSchedule> run() {
+    FeedSchedule out;
+    for (JointStretch& stretch : joint_stretches(in_.path)) {
+      ScheduledStretch scheduled;
+      scheduled.joints = std::move(stretch);
+      out.stretches.push_back(std::move(scheduled));
+    }
+    if (machine_.recipe.schedule == "programmed") refuse_overloads(out.stretches);
+    if (machine_.recipe.schedule == "constant") lower_to_constant(out.stretches);
+    std::size_t done = 0;
+    for (ScheduledStretch& stretch : out.stretches) {
+      if (has_error(problems_)) break;
+      solve(stretch, out);
+      if (++done % 64 == 0 && !progress_("schedule", static_cast<double>(done) /
+                                                         static_cast<double>(out.stretches.size())))
+        return Result<FeedSchedule>::failure(
+            diagnostic("KN105", "cancelled while the feed was scheduled", in_.file_name));
+    }
+    if (has_error(problems_)) return Result<FeedSchedule>::failure(std::move(problems_));
+    out.peaks.assign(machine_.axes.size(), {});
+    for (const ScheduledStretch& stretch : out.stretches) {
+      out.time += stretch.duration();
+      if (stretch.joints.end != StopCause::path_end) ++out.stops;
+      see_peaks(stretch, out.peaks);
+    }
+    return Result<FeedSchedule>(std::move(out), std::move(problems_));
+  }
+
+ private:
+  void solve(ScheduledStretch& stretch, FeedSchedule& out) {
+    if (!(stretch.joints.length() > 0.0)) return;
+    std::vector<RateCap> caps;
+    FeedResult result;
+    FeedSettings settings;
+    settings.element_time = element_time_;
+    settings.smooth_share = 1.0;  // joint_stretches() has looked at that
+    for (int round = 0; round <= kBlockRounds; ++round) {
+      result = schedule_feed(feed_path(stretch.joints, caps), limits_, {}, {}, settings, progress_);
+      if (result.status != FeedStatus::solved && result.status != FeedStatus::constant_map) break;
+      const std::vector<RateCap> more = short_blocks(stretch.joints, result.profile);
+      if (more.empty() || round == kBlockRounds) break;
+      for (const RateCap& cap : more) add(caps, cap);
+    }
+    if (result.status == FeedStatus::empty) return;
+    if (result.status != FeedStatus::solved && result.status != FeedStatus::constant_map) {
+      no_law(stretch.joints, result);
+      return;
+    }
+    stretch.profile = std::move(result.profile);
+    for (std::size_t i = 1; i < stretch.joints.sample_s.size(); ++i) {
+      const double time = block_time(stretch.joints, stretch.profile, i);
+      if (moves(stretch.joints, i))
+        stretch.slowing = std::max(stretch.slowing, machine_.cycle.min_block / time);
+    }
+    tell_bindings(stretch, result, out);
+    see_cut_speed(stretch, out);
+  }
+
+  // Sample i is not at the place of the one before it.
+  static bool moves(const JointStretch& stretch, std::size_t i) {
+    return stretch.sample_s[i] - stretch.sample_s[i - 1] > kNoBlock * stretch.length();
+  }
+
+  static double block_time(const JointStretch& stretch, const FeedProfile& profile, std::size_t i) {
+    return profile.time(stretch.sample_s[i]) - profile.time(stretch.sample_s[i - 1]);
+  }
+
+  // Caps for blocks that the control would have to make in less than its least time.
+  std::vector<RateCap> short_blocks(const JointStretch& stretch, const FeedProfile& profile) const {
+    std::vector<RateCap> caps;
+    const double least = machine_.cycle.min_block;
+    double before = 0.0;
+    for (std::size_t i = 1; i < stretch.sample_s.size(); ++i) {
+      const double now = profile.time(stretch.sample_s[i]);
+      const double way = stretch.sample_s[i] - stretch.sample_s[i - 1];
+      if (moves(stretch, i) && now - before < least * (1.0 - 1e-9))
+        caps.push_back(
+            {stretch.sample_s[i - 1], stretch.sample_s[i], (1.0 - kBlockReserve) * way / least});
+      before = now;
+    }
+    return caps;
+  }
+
+  // The same block again: its cap falls a little more.
+  static void add(std::vector<RateCap>& caps, const RateCap& cap) {
+    for (RateCap& old : caps)
+      if (old.from == cap.from) {
+        old.rate *= 0.98;
+        return;
+      }
+    caps.insert(
+        std::upper_bound(caps.begin(), caps.end(), cap,
+                         [](const RateCap& a, const RateCap& b) { return a.from < b.from; }),
+        cap);
+  }
+
+  // The pieces of the stretch, cut where caps begin and end. `stretch` has to outlive it.
+  static FeedPath feed_path(const JointStretch& stretch, const std::vector<RateCap>& caps) {
+    FeedPath path;
+    std::vector<std::size_t> owner;
+    const double least = 1e-9 * stretch.length();
+    path.breaks = {stretch.breaks.front()};
+    std::size_t cap = 0;
+    for (std::size_t p = 0; p < stretch.pieces(); ++p) {
+      const double end = stretch.breaks[p + 1];
+      double at = stretch.breaks[p];
+      while (at < end) {
+        while (cap < caps.size() && caps[cap].to <= at + least) ++cap;
+        double to = end;
+        double rate = stretch.rate[p];
+        if (cap < caps.size()) {
+          if (caps[cap].from <= at + least) {
+            rate = std::min(rate, caps[cap].rate);
+            if (caps[cap].to < end - least) to = caps[cap].to;
+          } else if (caps[cap].from < end - least) {
+            to = caps[cap].from;
+          }
+        }
+        path.breaks.push_back(to);
+        path.feed.push_back(stretch.feed[p]);
+        path.rate.push_back(rate);
+        owner.push_back(p);
+        at = to;
+      }
+    }
+    path.jet = [&stretch, owner = std::move(owner)](std::size_t piece, double s) {
+      return stretch.jet(owner[piece], s);
+    };
+    return path;
+  }
+
+  std::uint32_t line_at(const JointStretch& stretch, double s) const {
+    return stretch.line[stretch.piece_at(s)];
+  }
+
+  const std::string& axis_name(int joint) const {
+    return machine_.axes[static_cast<std::size_t>(joint)].name;
+  }
+
+  void no_law(const JointStretch& stretch, const FeedResult& result) {
+    const FeedWitness& w = result.witness;
+    std::string why;
+    switch (result.status) {
+      case FeedStatus::no_limit:
+        why = w.joint >= 0 ? "axis " + axis_name(w.joint) + " moves and has no limit above 0"
+                           : "the programmed feed is not above 0";
+        break;
+      case FeedStatus::not_smooth:
+        why = "the path jumps by " + number(w.value) + " in its direction or curvature";
+        break;
+      case FeedStatus::not_finite:
+        why = "a derivative of the joints is not finite";
+        break;
+      default:
+        why = "no joint moves at a place where the path goes on";
+    }
+    problems_.push_back(diagnostic("KN160", "there is no time law for the path here: " + why,
+                                   in_.file_name, static_cast<int>(line_at(stretch, w.s))));
+  }
+
+  // --- constant and programmed ---------------------------------------------------------------
+
+  bool in_cut(const JointStretch& stretch, const Cut& cut) const {
+    const std::uint32_t segment = samples_[stretch.first_sample + 1].segment;
+    return !cut.omitted && cut.first <= segment && segment <= cut.last;
+  }
+
+  void lower_to_constant(std::vector<ScheduledStretch>& stretches) {
+    for (const Cut& cut : in_.cuts) {
+      double feed = kInfinity;
+      for (const ScheduledStretch& s : stretches)
+        if (in_cut(s.joints, cut) && s.joints.length() > 0.0)
+          feed =
+              std::min(feed, largest_constant_feed(feed_path(s.joints, {}), limits_, kPlaces).feed);
+      for (ScheduledStretch& s : stretches)
+        if (in_cut(s.joints, cut))
+          for (double& f : s.joints.feed) f = std::min(f, feed);
+    }
+  }
+
+  void refuse_overloads(const std::vector<ScheduledStretch>& stretches) {
+    std::string text;
+    std::size_t count = 0;
+    std::uint32_t first_line = 0, last_line = 0;
+    for (const ScheduledStretch& s : stretches) {
+      if (!(s.joints.length() > 0.0)) continue;
+      for (const FeedOverload& o : overloads(feed_path(s.joints, {}), limits_, kPlaces)) {
+        if (o.kind == FeedOverload::Kind::none || o.factor <= 1.0 + 1e-9) continue;
+        const std::uint32_t line = s.joints.line[o.piece];
+        if (line == last_line) continue;
+        last_line = line;
+        if (first_line == 0) first_line = line;
+        if (++count > kMostTold) continue;
+        text += std::string(count > 1 ? "; " : "") + "line " + std::to_string(line) + ": axis " +
+                axis_name(o.joint) + " needs " + number(o.factor) + " times its " + word(o.kind);
+      }
+    }
+    if (count == 0) return;
+    if (count > kMostTold) text += "; and " + std::to_string(count - kMostTold) + " more lines";
+    problems_.push_back(diagnostic(
+        "KN152",
+        "the programmed feed cannot be kept (limits times tolerance.limit_share): " + text +
+            ". recipe.schedule = \"jerk\" slows down where it has to",
+        in_.file_name, static_cast<int>(first_line)));
+  }
+
+  // --- what was found --------------------------------------------------------------------------
+
+  void tell_bindings(const ScheduledStretch& stretch, const FeedResult& result, FeedSchedule& out) {
+    const JointStretch& joints = stretch.joints;
+    const std::array<double, 2> inside = between_ramps(stretch.profile);
+    for (FeedBinding b : result.bindings) {
+      b.from = std::max(b.from, inside[0]);
+      b.to = std::min(b.to, inside[1]);
+      if (b.joint < 0 || b.from >= b.to) continue;
+      const double factor = least_share_of_feed(stretch, b);
+      if (factor >= kFull) continue;
+      SlowedBy slow{b.joint,
+                    b.kind,
+                    line_at(joints, b.from),
+                    line_at(joints, b.to),
+                    factor,
+                    samples_[joints.first_sample + 1].segment};
+      SlowedBy* last = out.slowed_by.empty() ? nullptr : &out.slowed_by.back();
+      if (last && last->joint == slow.joint && last->limit == slow.limit &&
+          slow.first_line <= last->last_line + 1 && slow.first_line >= last->first_line) {
+        last->last_line = std::max(last->last_line, slow.last_line);
+        last->factor = std::min(last->factor, slow.factor);
+      } else {
+        out.slowed_by.push_back(slow);
+      }
+    }
+  }
+
+  // s where the ramp from rest ends and the one to rest begins: the first and last top of the
+  // speed.
+  static std::array<double, 2> between_ramps(const FeedProfile& profile) {
+    const double duration = profile.duration();
+    const auto steps = static_cast<int>(std::clamp(duration / kPeakStep, 16.0, 1e6));
+    std::array<double, 2> inside = {0.0, 0.0};
+    bool first = true;
+    bool rising = true;
+    for (int k = 1; k <= steps; ++k) {
+      const FeedState state = profile.at(duration * k / steps);
+      const bool rises = state.second > 0.0;
+      if (rising && !rises) {
+        if (first) inside[0] = state.s;
+        first = false;
+        inside[1] = state.s;
+      }
+      rising = rises;
+    }
+    return inside;
+  }
+
+  void see_cut_speed(const ScheduledStretch& stretch, FeedSchedule& out) const {
+    const JointStretch& joints = stretch.joints;
+    if (std::find(joints.beam.begin(), joints.beam.end(), true) == joints.beam.end()) return;
+    const std::array<double, 2> inside = between_ramps(stretch.profile);
+    const double from = stretch.profile.time(inside[0]), to = stretch.profile.time(inside[1]);
+    const auto steps = static_cast<int>(std::clamp((to - from) / kPeakStep, 1.0, 1e6));
+    for (int k = 0; k <= steps; ++k) {
+      const FeedState state = stretch.profile.at(from + (to - from) * k / steps);
+      const std::size_t piece = joints.piece_at(state.s);
+      const PathJet jet = joints.jet(piece, state.s);
+      const double speed = jet.tip_first * state.first / stretch.slowing;
+      if (!joints.beam[piece] || jet.tip_first <= 0.0 || speed >= out.slowest_cut) continue;
+      out.slowest_cut = speed;
+      out.slowest_cut_line = joints.line[piece];
+    }
+  }
+
+  double least_share_of_feed(const ScheduledStretch& stretch, const FeedBinding& b) const {
+    double least = kInfinity;
+    for (int k = 0; k <= 4; ++k) {
+      const double s = b.from + 0.25 * k * (b.to - b.from);
+      const std::size_t piece = stretch.joints.piece_at(s);
+      const double speed = stretch.profile.at(stretch.profile.time(s)).first / stretch.slowing;
+      const double feed = stretch.joints.feed[piece];
+      if (std::isfinite(feed))
+        least = std::min(least, speed * stretch.joints.jet(piece, s).tip_first / feed);
+    }
+    return least;
+  }
+
+  void see_peaks(const ScheduledStretch& stretch, std::vector<JointPeaks>& peaks) const {
+    const double duration = stretch.duration();
+    if (!(duration > 0.0)) return;
+    const auto steps = static_cast<std::size_t>(std::ceil(duration / kPeakStep)) + 1;
+    const double step = duration / static_cast<double>(steps);
+    for (std::size_t k = 0; k <= steps; ++k) {
+      const double t = static_cast<double>(k) * step;
+      const ScheduledStretch::Motion m = stretch.at(t);
+      const std::uint32_t line = line_at(stretch.joints, stretch.profile.at(t / stretch.slowing).s);
+      for (std::size_t j = 0; j < peaks.size(); ++j) {
+        JointPeaks& p = peaks[j];
+        const auto row = static_cast<Eigen::Index>(j);
+        see(std::abs(m.velocity[row]), line, p.velocity, p.velocity_line);
+        see(std::abs(m.acceleration[row]), line, p.acceleration, p.acceleration_line);
+        see(std::abs(m.jerk[row]), line, p.jerk, p.jerk_line);
+        p.jerk_square_integral += step * m.jerk[row] * m.jerk[row];
+      }
+    }
+  }
+
+  static void see(double value, std::uint32_t line, double& most, std::uint32_t& where) {
+    if (value <= most) return;
+    most = value;
+    where = line;
+  }
+
+  const ScheduleInput& in_;
+  const MachineDefinition& machine_;
+  const std::vector<JointSample>& samples_;
+  FeedLimits limits_;
+  double element_time_ = 0.0;
+  const Progress& progress_;
+  Diagnostics problems_;
+};
+
+}  // namespace
+
+ScheduledStretch::Motion ScheduledStretch::at(double t) const {
+  const FeedState state = profile.at(t / slowing);
+  const double c = 1.0 / slowing;
+  const double v = state.first * c, a = state.second * c * c, j = state.third * c * c * c;
+  const PathJet jet = joints.jet(joints.piece_at(state.s), state.s);
+  Motion m;
+  m.position = joints.joints_at(state.s);
+  m.velocity = v * jet.first;
+  m.acceleration = v * v * jet.second + a * jet.first;
+  m.jerk = v * v * v * jet.third + 3.0 * v * a * jet.second + j * jet.first;
+  return m;
+}
+
+const char* word(FeedWitness::Kind limit) {
+  switch (limit) {
+    case FeedWitness::Kind::velocity:
+      return "velocity";
+    case FeedWitness::Kind::acceleration:
+      return "acceleration";
+    case FeedWitness::Kind::jerk:
+      return "jerk";
+    case FeedWitness::Kind::turn_rate:
+      return "turn rate";
+    default:
+      return "feed";
+  }
+}
+
+Diagnostics schedule_notes(const FeedSchedule& schedule, const MachineDefinition& machine,
+                           const std::string& file_name) {
+  Diagnostics notes;
+  const auto add = [&](std::string text, std::uint32_t line) {
+    notes.push_back(diagnostic("KN161", std::move(text), file_name, static_cast<int>(line)));
+    notes.back().severity = Severity::note;
+  };
+  const auto slowest =
+      std::min_element(schedule.slowed_by.begin(), schedule.slowed_by.end(),
+                       [](const SlowedBy& a, const SlowedBy& b) { return a.factor < b.factor; });
+  if (slowest != schedule.slowed_by.end())
+    add("slower than programmed on " + std::to_string(schedule.slowed_by.size()) +
+            " stretches, most here: " + number(100.0 * slowest->factor) +
+            " % of the feed, for the " + word(slowest->limit) + " limit of axis " +
+            machine.axes[static_cast<std::size_t>(slowest->joint)].name +
+            " (cuts[].slowed_by in the report has them all)",
+        slowest->first_line);
+  if (schedule.stops > 0)
+    add("the path stops at " + std::to_string(schedule.stops) +
+            " places inside its cuts (corners that are not blended, dwells, events)",
+        0);
+  return notes;
+}
+
+FeedLimits feed_limits(const MachineDefinition& machine) {
+  const JointLimits limits = limits_of(machine);
+  FeedLimits out;
+  out.velocity = machine.tolerance.limit_share * limits.velocity;
+  out.acceleration = machine.tolerance.limit_share * limits.acceleration;
+  out.jerk = machine.tolerance.limit_share * limits.jerk;
+  for (int j = 0; j < machine.size(); ++j)
+    if (machine.axes[static_cast<std::size_t>(j)].source == LimitSource::assumed)
+      out.velocity[j] *= kAssumedShare;
+  return out;
+}
+
+Result<FeedSchedule> schedule_plan(const ScheduleInput& input, const Progress& progress) {
+  return Scheduler(input, progress).run();
+}
+
+std::vector<JointSample> timed_samples(std::vector<JointSample> samples,
+                                       const FeedSchedule& schedule) {
+  for (std::size_t k = 0; k < schedule.stretches.size(); ++k) {
+    const ScheduledStretch& stretch = schedule.stretches[k];
+    if (!(stretch.duration() > 0.0)) continue;
+    const JointStretch& joints = stretch.joints;
+    double before = 0.0;
+    for (std::size_t i = 1; i < joints.sample_s.size(); ++i) {
+      JointSample& sample = samples[joints.first_sample + i];
+      sample.stretch = static_cast<std::int32_t>(k);
+      sample.stretch_time = stretch.time_at(joints.sample_s[i]);
+      sample.time = std::max(sample.stretch_time - before, kLeastTime);
+      before = sample.stretch_time;
+    }
+  }
+  return samples;
+}
+
+}  // namespace smoothpost

@@ -1,0 +1,397 @@
+#include "postproc/pipeline/joint_stretch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "kernels/core/units.h"
+
+namespace smoothpost {
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kPerRadian = 50.0;                               // mm of s
+constexpr double kNoWay = 1e-9;                                   // mm
+constexpr double kSlowestRotaryFeed = 30.0 * kRadiansPerDegree;   // rad/s, turning without a feed
+constexpr double kVelocityJump = 1e-6, kAccelerationJump = 1e-3;  // of the limits
+constexpr double kSliver = 0.005;                                 // of both neighbours
+constexpr double kSamePlace = 1e-6;                               // mm or rad, sample and function
+
+/// Builds the stretches of one plan.
+class StretchBuilder {
+ public:
+  explicit StretchBuilder(const StretchesInput& input)
+      : in_(input),
+        samples_(input.plan.samples),
+        path_(input.path.reference().path()),
+        stops_(path_.points.size(), false) {
+    for (const PathEvent& e : path_.events)
+      if (is_stop(e)) stops_[e.point] = true;
+  }
+
+  std::vector<JointStretch> run() {
+    std::size_t end = 0;
+    while (end < samples_.size()) {
+      const std::size_t begin = end++;
+      while (end < samples_.size() && !path_.points[samples_[end].segment].replanned) ++end;
+      run_of(begin, end);
+    }
+    return std::move(out_);
+  }
+
+ private:
+  bool is_stop(const PathEvent& e) const {
+    if (e.kind == PathEvent::Kind::dwell) return e.seconds > 0.0;
+    if (e.kind == PathEvent::Kind::comment) return false;
+    for (const EventWords& row : in_.machine.process.events)
+      if (row.event == e.event.name) return !row.on_the_fly || row.dwell > 0.0;
+    return true;
+  }
+
+  void run_of(std::size_t begin, std::size_t end) {
+    begin_at(begin);
+    std::size_t i = begin + 1;
+    while (i < end) {
+      if (const LaserPlanPath* laser = laser_from(i)) {
+        finish(i - 1, StopCause::corner);
+        add_laser(*laser);
+        i = laser->last_sample() + 1;
+        begin_at(i - 1);
+        continue;
+      }
+      std::size_t last = i;  // the samples of one leg
+      while (last + 1 < end && samples_[last + 1].leg == samples_[i].leg && !laser_from(last + 1))
+        ++last;
+      add_leg(i, last);
+      i = last + 1;
+      if (samples_[last].s == 1.0 && stops_[samples_[last].segment] && i < end) {
+        finish(last, StopCause::event);
+        begin_at(last);
+      }
+    }
+    finish(end - 1, StopCause::path_end);
+    if (!out_.empty() && out_.back().last_sample + 1 == end) out_.back().end = StopCause::path_end;
+  }
+
+  void begin_at(std::size_t sample) {
+    now_ = JointStretch{};
+    now_.first_sample = sample;
+    now_.sample_s = {0.0};
+    now_.breaks = {0.0};
+    now_.joints = in_.machine.size();
+  }
+
+  void finish(std::size_t last, StopCause cause) {
+    if (last == now_.first_sample) return;
+    now_.last_sample = last;
+    now_.end = cause;
+    out_.push_back(std::move(now_));
+  }
+
+  // A stretch of the laser whose second sample is `i`.
+  const LaserPlanPath* laser_from(std::size_t i) const {
+    for (const LaserPlanPath& p : in_.laser)
+      if (p.first_sample + 1 == i) return &p;
+    return nullptr;
+  }
+
+  void add_laser(const LaserPlanPath& from) {
+    begin_at(from.first_sample);
+    now_.laser = std::make_shared<LaserJointPath>(from.path);
+    for (std::size_t k = 1; k < from.u.size(); ++k)
+      now_.sample_s.push_back(from.path.length_at(from.u[k]));
+    std::size_t sample = from.first_sample + 1;
+    const std::vector<double> breaks = from.path.breaks();
+    for (std::size_t b = 1; b < breaks.size(); ++b) {
+      now_.breaks.push_back(from.path.length_at(breaks[b]));
+      while (sample < from.last_sample() && from.u[sample - from.first_sample] < breaks[b])
+        ++sample;
+      add_piece_data(sample, 0.0);
+    }
+    finish(from.last_sample(), StopCause::corner);
+  }
+
+  // What holds on a piece that lies on the way to `sample`; of = s per second of the whole leg.
+  void add_piece_data(std::size_t sample, double rate) {
+    const PathPoint& point = path_.points[samples_[sample].segment];
+    const double way = in_.path.reference().length(samples_[sample].segment);
+    now_.feed.push_back(point.duration > 0.0 && way > kNoWay ? way / point.duration : kInfinity);
+    now_.rate.push_back(rate > 0.0 ? rate : kInfinity);
+    now_.line.push_back(point.line);
+    now_.beam.push_back(point.beam);
+  }
+
+  // Samples first .. last are one leg; the one before them is its start.
+  void add_leg(std::size_t first, std::size_t last) {
+    leg_first_ = first;
+    leg_last_ = last;
+    const std::size_t leg = samples_[first].leg;
+    const double extent = extent_of(leg);
+    const double start = now_.length();
+    if (extent <= 0.0) {
+      // Nothing moves: a block that stands still, whatever its time.
+      finish(first - 1, StopCause::corner);
+      return begin_at(last);
+    }
+    if (add_whole_leg(leg, extent, start)) return;
+    for (std::size_t i = first; i <= last; ++i) add_step(i, leg, extent);
+  }
+
+  double rotary_step(std::size_t from, std::size_t to) const {
+    double most = 0.0;
+    for (int j = 0; j < in_.machine.size(); ++j)
+      if (in_.machine.axes[static_cast<std::size_t>(j)].joint.kind == JointKind::rotary)
+        most = std::max(most, std::abs(samples_[to].q[j] - samples_[from].q[j]));
+    return most;
+  }
+
+  double extent_of(std::size_t leg) const {
+    const double way = in_.path.length(leg);
+    if (way > kNoWay) return way;
+    double turn = 0.0;
+    for (std::size_t i = leg_first_; i <= leg_last_; ++i) turn += rotary_step(i - 1, i);
+    if (turn > 1e-12) return kPerRadian * turn;
+    return (samples_[leg_last_].q - samples_[leg_first_ - 1].q).norm();
+  }
+
+  // ds/dt of a leg on which the tip does not move.
+  double rate_of(std::size_t leg, double extent) const {
+    const PathPoint& point = path_.points[samples_[leg_last_].segment];
+    if (in_.path.reference().length(samples_[leg_last_].segment) > kNoWay) return 0.0;
+    if (point.duration > 0.0) return extent / point.duration;
+    double turn = 0.0;
+    for (std::size_t i = leg_first_; i <= leg_last_; ++i) turn += rotary_step(i - 1, i);
+    (void)leg;
+    return point.kind == MotionKind::feed && turn > 0.0 ? extent / (turn / kSlowestRotaryFeed)
+                                                        : 0.0;
+  }
+
+  // Share of the leg at which sample i stands; that of the one before the leg is 0.
+  double share_of(std::size_t i) const { return i < leg_first_ ? 0.0 : samples_[i].leg_share; }
+
+  JointVector near(double share) const {
+    std::size_t i = leg_first_;
+    while (i < leg_last_ && samples_[i].leg_share < share) ++i;
+    const double from = share_of(i - 1), to = share_of(i);
+    const double t = to > from ? std::clamp((share - from) / (to - from), 0.0, 1.0) : 1.0;
+    return samples_[i - 1].q + t * (samples_[i].q - samples_[i - 1].q);
+  }
+
+  // Joints and tip at a share of the leg. Out of reach: the straight way, which is found out as no
+  // smooth one.
+  PathValue at(std::size_t leg, double share) const {
+    const int n = in_.machine.size();
+    PathValue v(n + 3);
+    const JointVector guess = near(share);
+    v.head(n) = in_.plan.joints_on_leg(leg, share, guess).value_or(guess);
+    v.tail<3>() = in_.path.at(leg, share).tip;
+    return v;
+  }
+
+  bool by_joints() const {
+    for (std::size_t i = leg_first_; i <= leg_last_; ++i)
+      if (samples_[i].by_joints) return true;
+    return false;
+  }
+
+  bool same_place(const PathValue& value, std::size_t sample) const {
+    return (value.head(in_.machine.size()) - samples_[sample].q).cwiseAbs().maxCoeff() < kSamePlace;
+  }
+
+  // Two windows that end at nearly the same place leave a piece too short for third derivatives of
+  // rounded values; both sides are C³ there, so that one formula stands for the other.
+  static std::vector<double> without_slivers(std::vector<double> breaks) {
+    for (std::size_t i = 1; i + 2 < breaks.size();) {
+      const double before = breaks[i] - breaks[i - 1], gap = breaks[i + 1] - breaks[i];
+      const double after = breaks[i + 2] - breaks[i + 1];
+      if (gap < kSliver * std::min(before, after))
+        breaks.erase(breaks.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+      else
+        ++i;
+    }
+    return breaks;
+  }
+
+  // The whole leg by the planner's function; false and nothing added if that is not smooth.
+  bool add_whole_leg(std::size_t leg, double extent, double start) {
+    if (by_joints() || !in_.plan.joints_on_leg) return false;
+    for (std::size_t i = leg_first_; i <= leg_last_; ++i)
+      if (!same_place(at(leg, share_of(i)), i)) return false;
+    if (!same_place(at(leg, 0.0), leg_first_ - 1)) return false;
+    const std::vector<double> shares = without_slivers(in_.path.breaks(leg));
+    const std::size_t before = now_.pieces();
+    const std::size_t sub_before = now_.path.pieces();
+    for (std::size_t b = 1; b < shares.size(); ++b) {
+      const double from = start + shares[b - 1] * extent, to = start + shares[b] * extent;
+      if (!(to > from)) continue;
+      if (!append([&](double s) { return at(leg, std::clamp((s - start) / extent, 0.0, 1.0)); },
+                  from, to)) {
+        drop_pieces(before, sub_before);
+        return false;
+      }
+      add_piece_data(leg_last_, rate_of(leg, extent));
+    }
+    stop_if_rough(before, sub_before, leg_first_ - 1);
+    const double shift = now_.length() - extent - start;  // of s, when a new stretch began
+    for (std::size_t i = leg_first_; i <= leg_last_; ++i)
+      now_.sample_s.push_back(start + shift + share_of(i) * extent);
+    return true;
+  }
+
+  bool append(const ChebyshevPath::Function& f, double from, double to) {
+    if (!now_.path.append(f, from, to, {})) return false;
+    now_.sub_end.push_back(static_cast<std::uint32_t>(now_.path.pieces()));
+    now_.breaks.push_back(to);
+    return true;
+  }
+
+  void drop_pieces(std::size_t pieces, std::size_t sub_pieces) {
+    now_.path.shorten(sub_pieces);
+    now_.breaks.resize(pieces + 1);
+    now_.sub_end.resize(pieces);
+    now_.feed.resize(pieces);
+    now_.rate.resize(pieces);
+    now_.line.resize(pieces);
+    now_.beam.resize(pieces);
+  }
+
+  // From sample i − 1 straight in the joints to sample i, from stop to stop.
+  void add_step(std::size_t i, std::size_t leg, double extent) {
+    finish(i - 1, i == leg_first_ ? StopCause::corner : StopCause::no_formula);
+    begin_at(i - 1);
+    const double share = share_of(i) - share_of(i - 1);
+    double way = share * extent;
+    if (!(way > 0.0)) way = kPerRadian * rotary_step(i - 1, i);
+    if (!(way > 0.0)) way = (samples_[i].q - samples_[i - 1].q).norm();
+    const int n = in_.machine.size();
+    const Vec3 from_tip = in_.path.at(leg, share_of(i - 1)).tip;
+    const Vec3 to_tip = in_.path.at(leg, share_of(i)).tip;
+    if (way > 0.0) {
+      append(
+          [&](double s) {
+            PathValue v(n + 3);
+            v.head(n) = samples_[i - 1].q + s / way * (samples_[i].q - samples_[i - 1].q);
+            v.tail<3>() = from_tip + s / way * (to_tip - from_tip);
+            return v;
+          },
+          0.0, way);
+      add_piece_data(i, rate_of(leg, extent));
+    }
+    now_.sample_s.push_back(way > 0.0 ? way : 0.0);
+    finish(i, StopCause::no_formula);
+    begin_at(i);
+  }
+
+  // The leg from piece `first` on was appended: does the path pass its start without a stop?
+  void stop_if_rough(std::size_t first, std::size_t first_sub, std::size_t sample) {
+    if (first == 0 || !is_rough(first)) return;
+    JointStretch leg = now_;
+    const double start = leg.breaks[first];
+    drop_pieces(first, first_sub);
+    finish(sample, StopCause::corner);
+    begin_at(sample);
+    now_.feed.assign(leg.feed.begin() + static_cast<std::ptrdiff_t>(first), leg.feed.end());
+    now_.rate.assign(leg.rate.begin() + static_cast<std::ptrdiff_t>(first), leg.rate.end());
+    now_.line.assign(leg.line.begin() + static_cast<std::ptrdiff_t>(first), leg.line.end());
+    now_.beam.assign(leg.beam.begin() + static_cast<std::ptrdiff_t>(first), leg.beam.end());
+    for (std::size_t p = first; p < leg.pieces(); ++p) {
+      now_.breaks.push_back(leg.breaks[p + 1] - start);
+      now_.sub_end.push_back(leg.sub_end[p] - static_cast<std::uint32_t>(first_sub));
+    }
+    now_.path = leg.path.tail(first_sub, start);
+  }
+
+  bool is_rough(std::size_t piece) const {
+    const double s = now_.breaks[piece];
+    const PathJet before = now_.jet(piece - 1, s);
+    const PathJet after = now_.jet(piece, s);
+    for (int j = 0; j < in_.machine.size(); ++j) {
+      const AxisDefinition& axis = in_.machine.axes[static_cast<std::size_t>(j)];
+      const double speed = fastest(piece, before, after);
+      if (std::abs(after.first[j] - before.first[j]) * speed > kVelocityJump * axis.velocity)
+        return true;
+      if (std::abs(after.second[j] - before.second[j]) * speed * speed >
+          kAccelerationJump * axis.acceleration)
+        return true;
+    }
+    return false;
+  }
+
+  // ds/dt with which the path may pass the start of `piece`.
+  double fastest(std::size_t piece, const PathJet& before, const PathJet& after) const {
+    double speed = kInfinity;
+    for (int j = 0; j < in_.machine.size(); ++j) {
+      const double rate = std::max(std::abs(before.first[j]), std::abs(after.first[j]));
+      if (rate > 0.0)
+        speed = std::min(speed, in_.machine.axes[static_cast<std::size_t>(j)].velocity / rate);
+    }
+    const double way = std::min(before.tip_first, after.tip_first);
+    const double feed = std::min(now_.feed[piece - 1], now_.feed[piece]);
+    if (way > 0.0) speed = std::min(speed, feed / way);
+    return std::min({speed, now_.rate[piece - 1], now_.rate[piece]});
+  }
+
+  const StretchesInput& in_;
+  const std::vector<JointSample>& samples_;
+  const ToolPath& path_;
+  std::vector<bool> stops_;  ///< of path points
+  std::size_t leg_first_ = 0, leg_last_ = 0;
+  JointStretch now_;
+  std::vector<JointStretch> out_;
+};
+
+// Of the length of the way with derivatives c1, c2, c3.
+void set_tip(PathJet& jet, const Vec3& c1, const Vec3& c2, const Vec3& c3) {
+  const double way = c1.norm();
+  jet.tip_first = way;
+  if (way <= 0.0) return;
+  const double along = c1.dot(c2) / way;
+  jet.tip_second = along;
+  jet.tip_third = (c2.squaredNorm() + c1.dot(c3) - along * along) / way;
+}
+
+}  // namespace
+
+std::size_t JointStretch::piece_at(double s) const {
+  const auto next = std::upper_bound(breaks.begin(), breaks.end(), s);
+  const std::ptrdiff_t at = next - breaks.begin() - 1;
+  return static_cast<std::size_t>(
+      std::clamp<std::ptrdiff_t>(at, 0, static_cast<std::ptrdiff_t>(pieces()) - 1));
+}
+
+JointVector JointStretch::joints_at(double s) const {
+  if (laser)
+    return laser->joints(std::clamp(laser->parameter_at(s), laser->first(), laser->last()));
+  return path.value(path.piece_at(s), s).head(joints);
+}
+
+PathJet JointStretch::jet(std::size_t piece, double s) const {
+  PathJet out;
+  if (laser) {
+    const double u = std::clamp(laser->parameter_at(s), laser->first(), laser->last());
+    const double scale = (laser->last() - laser->first()) / laser->length;
+    const JointJet q = laser->jet(u);
+    out.first = scale * q.col(1);
+    out.second = scale * scale * q.col(2);
+    out.third = scale * scale * scale * q.col(3);
+    const auto tip = laser->tip_jet(u);
+    set_tip(out, scale * tip.col(1), scale * scale * tip.col(2),
+            scale * scale * scale * tip.col(3));
+    return out;
+  }
+  const std::size_t low = piece == 0 ? 0 : sub_end[piece - 1];
+  const std::size_t sub = std::clamp<std::size_t>(path.piece_at(s), low, sub_end[piece] - 1);
+  const ChebyshevJet jet = path.jet(sub, s);
+  out.first = jet[1].head(joints);
+  out.second = jet[2].head(joints);
+  out.third = jet[3].head(joints);
+  set_tip(out, jet[1].tail<3>(), jet[2].tail<3>(), jet[3].tail<3>());
+  return out;
+}
+
+std::vector<JointStretch> joint_stretches(const StretchesInput& input) {
+  return StretchBuilder(input).run();
+}
+
+}  // namespace smoothpost

@@ -1,0 +1,188 @@
+#include "postproc/pipeline/timeline.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/core/process.h"
+#include "kernels/core/units.h"
+#include "machines/dialects/decimal.h"
+#include "postproc/pipeline/tool_motion.h"
+
+namespace smoothpost {
+
+namespace {
+
+constexpr int kMillimetreDecimals = 7, kDegreeDecimals = 8;
+
+class TimelineBuilder {
+ public:
+  explicit TimelineBuilder(const TimelineInput& input)
+      : in_(input), limits_(feed_limits(input.machine)) {
+    out_.laws = input.schedule.stretches;
+  }
+
+  Timeline run() {
+    const JointMask all = (1U << in_.machine.size()) - 1U;
+    JointMask known = 0;
+    std::size_t action = 0;
+    for (std::size_t i = 0; i < in_.program.moves.size(); ++i) {
+      const MachineMove& move = in_.program.moves[i];
+      for (; action < in_.program.actions.size() && in_.program.actions[action].before <= i;
+           ++action)
+        act(in_.program.actions[action], known == all);
+      const JointVector from = at_;
+      if (known == 0) at_ = move.to;
+      for (int j = 0; j < in_.machine.size(); ++j)
+        if (move.interpolation == MoveInterpolation::tool || (move.joints >> j & 1U))
+          at_[j] = move.to[j];
+      const bool started = known == all;
+      known |= move.interpolation == MoveInterpolation::tool ? all : move.joints;
+      if (started) add(move, from);
+    }
+    for (; action < in_.program.actions.size(); ++action)
+      act(in_.program.actions[action], known == all);
+    return std::move(out_);
+  }
+
+ private:
+  void act(const MachineAction& action, bool started) {
+    double seconds = action.kind == MachineAction::Kind::dwell ? action.seconds : 0.0;
+    if (action.kind == MachineAction::Kind::event) {
+      if (action.event.name == event_name::kBeamOn) beam_ = true;
+      if (action.event.name == event_name::kBeamOff) beam_ = false;
+      for (const EventWords& row : in_.machine.process.events)
+        if (row.event == action.event.name) seconds = row.dwell;
+    }
+    if (!started || !(seconds > 0.0)) return;
+    TimelineItem item;
+    item.duration = seconds;
+    item.stand = at_;
+    item.line = action.input_line;
+    push(std::move(item));
+  }
+
+  void push(TimelineItem item) {
+    item.start = out_.duration();
+    item.beam = beam_;
+    out_.items.push_back(std::move(item));
+  }
+
+  void add(const MachineMove& move, const JointVector& from) {
+    TimelineItem item;
+    item.line = move.input_line;
+    if (move.role == MoveRole::path) item.segment = move.segment;
+    if (move.stretch >= 0) {
+      item.law = move.stretch;
+      item.from = move.stretch == stretch_ ? reached_ : 0.0;
+      item.duration = move.stretch_time - item.from;
+      stretch_ = move.stretch;
+      reached_ = move.stretch_time;
+      return push(std::move(item));
+    }
+    ScheduledStretch law = straight(move, from);
+    if (!(law.duration() > 0.0)) {
+      item.stand = at_;
+      item.duration = move.duration;
+      if (item.duration > 0.0) push(std::move(item));
+      return;
+    }
+    item.law = static_cast<std::int32_t>(out_.laws.size());
+    item.duration = law.duration();
+    out_.laws.push_back(std::move(law));
+    push(std::move(item));
+  }
+
+  // From rest to rest, straight in the joints or by the tool.
+  ScheduledStretch straight(const MachineMove& move, const JointVector& from) const {
+    ScheduledStretch law;
+    JointStretch& joints = law.joints;
+    const double way = (at_ - from).norm();
+    if (!(way > 1e-9)) return law;
+    const int n = in_.machine.size();
+    const JointVector to = at_;
+    const Pose start = tip_pose(in_.chain, from, move.tool_length);
+    const bool by_tool = move.interpolation == MoveInterpolation::tool;
+    const auto value = [&](double s) {
+      const double t = s / way;
+      PathValue v(n + 3);
+      JointVector q = from + t * (to - from);
+      if (by_tool) {
+        const Pose tip = tool_motion(start, move.tool, t, in_.turn, in_.chain.tool_axis);
+        q = in_.inverse.nearest(holder_pose(in_.chain, tip, move.tool_length), q).value_or(q);
+      }
+      v.head(n) = q;
+      v.tail<3>() = tip_pose(in_.chain, q, move.tool_length).translation();
+      return v;
+    };
+    joints.joints = n;
+    if (!joints.path.append(value, 0.0, way, {})) return law;
+    joints.breaks = {0.0, way};
+    joints.sub_end = {static_cast<std::uint32_t>(joints.path.pieces())};
+    joints.feed = {std::numeric_limits<double>::infinity()};
+    joints.rate = {move.rapid || !(move.duration > 0.0) ? joints.feed[0] : way / move.duration};
+    joints.line = {move.input_line};
+    FeedPath path;
+    path.breaks = joints.breaks;
+    path.feed = joints.feed;
+    path.rate = joints.rate;
+    path.jet = [&joints](std::size_t piece, double s) { return joints.jet(piece, s); };
+    law.profile = schedule_feed(path, limits_, {}, {}, {}, {}).profile;
+    return law;
+  }
+
+  const TimelineInput& in_;
+  FeedLimits limits_;
+  JointVector at_;
+  bool beam_ = false;
+  std::int32_t stretch_ = -1;
+  double reached_ = 0.0;  ///< time of stretch_
+  Timeline out_;
+};
+
+void append_row(std::string& text, const MachineDefinition& machine, const JointVector& q) {
+  for (int j = 0; j < machine.size(); ++j) {
+    const bool rotary = machine.axes[static_cast<std::size_t>(j)].joint.kind == JointKind::rotary;
+    text += ',';
+    append_decimal(text, rotary ? degrees_from_radians(q[j]) : q[j],
+                   rotary ? kDegreeDecimals : kMillimetreDecimals);
+  }
+}
+
+}  // namespace
+
+ScheduledStretch::Motion Timeline::at(const TimelineItem& item, double time) const {
+  if (item.law >= 0)
+    return laws[static_cast<std::size_t>(item.law)].at(item.from + time - item.start);
+  const JointVector none = JointVector::Zero(item.stand.size());
+  return {item.stand, none, none, none};
+}
+
+Timeline timeline_of(const TimelineInput& input) { return TimelineBuilder(input).run(); }
+
+std::string trajectory_csv(const Timeline& timeline, const MachineDefinition& machine,
+                           const ScrewChain& chain, double tool_length) {
+  std::string text = "t_s";
+  for (const auto& axis : machine.axes)
+    text += "," + axis.name + (axis.joint.kind == JointKind::rotary ? "_deg" : "_mm");
+  text += ",x_mm,y_mm,z_mm,i,j,k,beam\n";
+  const double cycle = machine.cycle.time;
+  const double end = timeline.duration();
+  std::size_t at = 0;
+  for (long long k = 0; !timeline.items.empty(); ++k) {
+    const double t = static_cast<double>(k) * cycle;
+    while (at + 1 < timeline.items.size() && timeline.items[at + 1].start <= t) ++at;
+    const TimelineItem& item = timeline.items[at];
+    const JointVector q = timeline.at(item, std::min(t, end)).position;
+    append_decimal(text, t, 6);
+    append_row(text, machine, q);
+    const CutterLocation holder = forward_location(chain, q);
+    const Vec3 tip = holder.tip - tool_length * holder.axis;
+    for (int i = 0; i < 3; ++i) append_decimal(text += ',', tip[i], 6);
+    for (int i = 0; i < 3; ++i) append_decimal(text += ',', holder.axis[i], 9);
+    text += item.beam && t < end ? ",1\n" : ",0\n";
+    if (t >= end) break;
+  }
+  return text;
+}
+
+}  // namespace smoothpost
