@@ -28,8 +28,8 @@ std::optional<InterpretedInput> boat(const char* name, const char* machine) {
   return std::move(read.value());
 }
 
-/// Of the boat: a planar one and one with both rotaries moving. The whole boat is [slow].
-const CutRange kTwoCuts{9, 10};
+/// Of the boat, with both rotaries moving. The whole boat is [slow].
+const CutRange kTwoCuts{11, 12};
 
 Conversion to_bc(InterpretedInput input, const char* name, std::optional<CutRange> cuts = {}) {
   ConvertInput in;
