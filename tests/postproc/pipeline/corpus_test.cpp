@@ -97,6 +97,7 @@ void boats_on_the_table(std::optional<CutRange> cuts) {
 void boats_on_other_machines(std::optional<CutRange> cuts) {
   for (const auto& [name, from] :
        {std::pair{"boat-xyzac.ngc", "table_table_ac"}, {"boat-xyzbc.ngc", "table_table_bc"}}) {
+    if (cuts && std::string(from) == "table_table_bc") continue;  // its cuts are others
     for (const char* to : {"robot_6r", "head_table_bc", "laser_5p1_offset"}) {
       auto input = boat(name, from);
       if (!input) {
@@ -142,7 +143,7 @@ TEST_CASE("corpus: both boat programs are certified on the B/C table",
   boats_on_the_table({});
 }
 
-TEST_CASE("corpus: cuts of both boats on a robot, a head-table machine and an offset laser",
+TEST_CASE("corpus: cuts of a boat on a robot, a head-table machine and an offset laser",
           "[postproc][pipeline][corpus]") {
   boats_on_other_machines(kTwoCuts);
 }
@@ -152,7 +153,8 @@ TEST_CASE("corpus: both boat programs on a robot, a head-table machine and an of
   boats_on_other_machines({});
 }
 
-TEST_CASE("corpus: a SINUMERIK program with TRAORI and frames", "[postproc][pipeline][corpus]") {
+TEST_CASE("corpus: a SINUMERIK program with TRAORI and frames",
+          "[.slow][slow][postproc][pipeline][corpus]") {
   const auto path = shared_path(
       "corpus/1_five_axis/ElMoe/NC_code/Coordinate_system_representation_Achskreuz/"
       "Coordinate_system_representation_Achskreuz.mpf");
@@ -281,7 +283,7 @@ void printer_on_the_table(int lines, std::size_t least_blocks) {
 }  // namespace
 
 TEST_CASE("corpus: the beginning of the B/C program of a printer", "[postproc][pipeline][corpus]") {
-  printer_on_the_table(600, 400);
+  printer_on_the_table(120, 80);
 }
 
 TEST_CASE("corpus: the 34,000 line B/C program of a printer",
