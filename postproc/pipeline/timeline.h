@@ -48,16 +48,6 @@ struct TimelineInput {
 /// for each of those.
 Timeline timeline_of(const TimelineInput& input);
 
-/// How a timeline keeps the limits and the input's path, for the report.
-struct TimelineReport {
-  std::size_t samples = 0;
-  double cycle = 0.0;           ///< s
-  double tip_deviation = 0.0;   ///< mm, largest of all samples of cuts, at equal path parameter
-  double axis_deviation = 0.0;  ///< rad
-  double chord = 0.0;           ///< mm or rad: Σ of joints' A·cycle²/8, between two samples
-  FeedLoad load;                ///< largest share of the machine's own limits, links too
-};
-
 /// The joints at the machine's cycle time as CSV: `t_s`, one column per axis with its unit (X_mm,
 /// C_deg), then x_mm,y_mm,z_mm,i,j,k of the tool in the part and beam (0/1). Seven decimals of mm,
 /// eight of degrees: at 1 ms a rounding of half a digit is a jerk of 4·10⁻⁷/10⁻⁹ = 400 mm/s³.
