@@ -3,14 +3,10 @@
 #include <array>
 #include <optional>
 
+#include "kernels/kinematics/jet.h"
 #include "kernels/kinematics/screw_chain.h"
 
 namespace smoothpost {
-
-/// Value and first three derivatives of one number by the path parameter, at one place.
-using Jet = std::array<double, 4>;
-/// The same for a vector: column r is the r-th derivative.
-using VectorJet = Eigen::Matrix<double, 3, 4>;
 
 /// A cutting head: three linear axes that carry two rotaries that carry a redundant linear axis
 /// along the tool, with a fixed workpiece (TTT RRT; the laser of paper B).

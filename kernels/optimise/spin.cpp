@@ -16,11 +16,11 @@ namespace {
 constexpr double kJerkWeight = 0.05;
 constexpr double kFirstStep = 0.25;  // rad, of the search
 
-/// The six quintic basis functions that are not 0 on a span, at share t of it.
-std::array<double, 6> quintic(double t) {
+/// The basis functions of a degree ≤ 5 that are not 0 on a span, at share t of it.
+std::array<double, 6> uniform_basis(double t, int degree) {
   std::array<double, 6> b{1.0, 0.0, 0.0, 0.0, 0.0, 0.0};
   // De Boor's recurrence on unit spans.
-  for (int order = 1; order <= 5; ++order) {
+  for (int order = 1; order <= degree; ++order) {
     std::array<double, 6> next{};
     for (int i = 0; i < order; ++i) {
       const double left = (t + order - 1 - i) / order;
@@ -128,10 +128,29 @@ SpinProfile::SpinProfile(std::vector<double> coefficients, double length)
 double SpinProfile::at(double x) const {
   if (coefficients_.size() == 1) return coefficients_.front();
   const Place place = place_of(x, length_, coefficients_.size());
-  const auto b = quintic(place.t);
+  const auto b = uniform_basis(place.t, 5);
   double value = 0.0;
   for (std::size_t i = 0; i < 6; ++i) value += b[i] * coefficients_[place.span + i];
   return value;
+}
+
+Jet SpinProfile::jet(double x) const {
+  Jet out{at(x), 0.0, 0.0, 0.0};
+  if (coefficients_.size() == 1 || x < 0.0 || x > length_) return out;
+  const Place place = place_of(x, length_, coefficients_.size());
+  const double spans_per_mm = (static_cast<double>(coefficients_.size()) - 5.0) / length_;
+  std::array<double, 6> c{};
+  for (std::size_t i = 0; i < 6; ++i) c[i] = coefficients_[place.span + i];
+  double scale = 1.0;
+  for (std::size_t r = 1; r < 4; ++r) {
+    scale *= spans_per_mm;
+    const auto b = uniform_basis(place.t, 5 - static_cast<int>(r));
+    for (std::size_t i = 0; i + r < 6; ++i) {
+      c[i] = c[i + 1] - c[i];
+      out[r] += scale * b[i] * c[i];
+    }
+  }
+  return out;
 }
 
 SpinMeasure measure_spin(const SixR& arm, const std::vector<SpinPoint>& points,
@@ -204,7 +223,7 @@ SpinProfile spin_near(const std::vector<double>& lengths, const std::vector<doub
   std::vector<double> sum(n, 0.0), weight(n, 0.0);
   for (std::size_t k = 0; k < lengths.size(); ++k) {
     const Place place = place_of(lengths[k], length, n);
-    const auto b = quintic(place.t);
+    const auto b = uniform_basis(place.t, 5);
     // A point stands for the way around it.
     const double before = k > 0 ? lengths[k] - lengths[k - 1] : 0.0;
     const double behind = k + 1 < lengths.size() ? lengths[k + 1] - lengths[k] : 0.0;

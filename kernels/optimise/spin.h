@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "kernels/kinematics/jet.h"
 #include "kernels/kinematics/six_r.h"
 #include "kernels/optimise/arm_reach.h"
 
@@ -19,6 +20,8 @@ class SpinProfile {
   SpinProfile(std::vector<double> coefficients, double length);
   /// ψ at path length x, held at the ends of [0, length].   Cost: O(1), no allocation.
   double at(double x) const;
+  /// ψ with its derivatives by x inside [0, length], constant beyond.   Cost: likewise.
+  Jet jet(double x) const;
   const std::vector<double>& coefficients() const { return coefficients_; }
 
  private:

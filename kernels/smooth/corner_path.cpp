@@ -227,8 +227,9 @@ void CornerPath::share(std::vector<double>& extents, const std::vector<double>& 
     const std::size_t b = settings_.closed && leg + 1 == legs_.size() ? 0 : leg + 1;
     const double length = lengths_[leg];
     if (wanted[a] + wanted[b] <= length) continue;
-    const double sum = weights[a] + weights[b];
-    const double part = sum > 0.0 ? length * weights[a] / sum : 0.5 * length;
+    const double of_a = std::sqrt(weights[a]);
+    const double sum = of_a + std::sqrt(weights[b]);
+    const double part = sum > 0.0 ? length * of_a / sum : 0.5 * length;
     extents[a] = std::min(extents[a], std::max(part, length - wanted[b]));
     extents[b] = std::min(extents[b], std::max(length - part, length - wanted[a]));
     extents[b] = std::max(0.0, std::min(extents[b], length - extents[a]));

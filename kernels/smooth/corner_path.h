@@ -78,11 +78,11 @@ struct PoseDerivatives {
 /// Half widths: h·g(0)·(|T1 − T0| + reach·h·K/2) = tip_tolerance with K the sum of the legs'
 /// curvatures, h'·g(0)·|w1 − w0| = rotation_tolerance (tool_axis: of the part of w1 − w0 across
 /// it, less where turns about the tool and across it together would move the axis further). Two
-/// neighbours that want more of a leg than there is share it by their curvature, k =
-/// sin(θ/2)/cos²(θ/2) (rotation: |w1 − w0|): each takes at least its share, at most what the other
-/// leaves, never more than the leg together. Tip and rotation do so apart from each other: their
-/// windows may overlap in any order, at one corner and between neighbours, because they are two
-/// functions of σ that do not know of each other.
+/// neighbours that want more of a leg than there is share it by √k, k = sin(θ/2)/cos²(θ/2)
+/// (rotation: |w1 − w0|), so that their third derivatives, ~ k/h², are alike: each takes at least
+/// its share, at most what the other leaves, never more than the leg together. Tip and rotation do
+/// so apart from each other: their windows may overlap in any order, at one corner and between
+/// neighbours, because they are two functions of σ that do not know of each other.
 ///
 /// Guarantees (tests): distance of the tips and angle of the rotations at equal σ never above the
 /// tolerances; C³ in σ everywhere but at stops and exact corners; the tip never stops where its leg
@@ -95,7 +95,9 @@ struct PoseDerivatives {
 ///  - Rotation by the rotation vector at the node, not by Euler angles: no gimbal, the tolerance is
 ///    on the whole angle (Eq. (28) bounds the axis to first order only).
 ///  - No links between corners (Eq. (38)–(40)): they are not synchronous as printed.
-///  - No reserved third of each leg (Eq. (16)).
+///  - No reserved third of each leg (Eq. (16)). Shared by k itself (equal curvatures), a corner
+///  that
+///    hardly turns between sharp ones would get a window of nanometres and all the jerk.
 class CornerPath {
  public:
   /// Cost: O(nodes), no search; 1 million corners a second on one core. Memory: nodes and legs as

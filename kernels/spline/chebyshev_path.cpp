@@ -15,7 +15,7 @@ constexpr double kPi = 3.14159265358979323846;
 using Basis = Eigen::Matrix<double, kPoints, 1>;
 
 // cos(π(i + 1/2)/n), descending in i.
-double node(int i) { return std::cos(kPi * (i + 0.5) / kPoints); }
+double node(int i, int n = kPoints) { return std::cos(kPi * (i + 0.5) / n); }
 
 // T_k and its first three derivatives at x ∈ [−1, 1], by their recurrences.
 std::array<Basis, 4> basis(double x) {
@@ -35,16 +35,33 @@ std::array<Basis, 4> basis(double x) {
   return t;
 }
 
-// Row i: T_k at node i times its weight in the discrete cosine sum.
-const Eigen::Matrix<double, kPoints, kPoints>& transform() {
-  static const Eigen::Matrix<double, kPoints, kPoints> matrix = [] {
-    Eigen::Matrix<double, kPoints, kPoints> m;
-    for (int i = 0; i < kPoints; ++i)
-      for (int k = 0; k < kPoints; ++k)
-        m(i, k) = (k == 0 ? 1.0 : 2.0) / kPoints * std::cos(k * kPi * (i + 0.5) / kPoints);
+// Row i: T_k at node i of N times its weight in the discrete cosine sum.
+template <int N>
+const Eigen::Matrix<double, N, N>& transform() {
+  static const Eigen::Matrix<double, N, N> matrix = [] {
+    Eigen::Matrix<double, N, N> m;
+    for (int i = 0; i < N; ++i)
+      for (int k = 0; k < N; ++k)
+        m(i, k) = (k == 0 ? 1.0 : 2.0) / N * std::cos(k * kPi * (i + 0.5) / N);
     return m;
   }();
   return matrix;
+}
+
+using Values = Eigen::Matrix<double, Eigen::Dynamic, kPoints, Eigen::ColMajor, 16, kPoints>;
+
+// The integral of a piece's polynomial of degree below kPoints − 1 that is `at_middle` at x = 0.
+Values integral(const Values& c, const PathValue& at_middle) {
+  Values out = Values::Zero(c.rows(), kPoints);
+  out.col(1) = c.col(0) - 0.5 * c.col(2);
+  for (int k = 2; k < kPoints; ++k)
+    out.col(k) =
+        (c.col(k - 1) - (k + 1 < kPoints ? 1.0 : 0.0) * c.col(std::min(k + 1, kPoints - 1))) /
+        (2.0 * k);
+  // T_k(0) is 1, 0, −1, 0, 1, …
+  for (int k = 2; k < kPoints; k += 2) out.col(0) += (k % 4 == 0 ? -1.0 : 1.0) * out.col(k);
+  out.col(0) += at_middle;
+  return out;
 }
 
 }  // namespace
@@ -65,10 +82,68 @@ bool ChebyshevPath::append(const Function& f, double from, double to,
       if (i == 0) values.resize(v.size(), kPoints);
       values.col(i) = v;
     }
-    const Coefficients c = values * transform();
+    const Coefficients c = values * transform<kPoints>();
     const PathValue range = 0.5 * (values.rowwise().maxCoeff() - values.rowwise().minCoeff());
     const PathValue tail = c.rightCols<2>().cwiseAbs().rowwise().maxCoeff();
     if ((tail.array() <= settings.relative * range.array() + settings.absolute).all()) {
+      coefficients_.push_back(c);
+      ends_.push_back(end);
+      at = end;
+      waiting.pop_back();
+    } else if (depth >= settings.most_halvings || middle <= at || middle >= end) {
+      shorten(before);
+      return false;
+    } else {
+      waiting.back().second = depth + 1;
+      waiting.emplace_back(middle, depth + 1);
+    }
+  }
+  return true;
+}
+
+bool ChebyshevPath::append_jets(const JetFunction& f, double from, double to,
+                                const PathValue& third, const ChebyshevJetSettings& settings) {
+  require(to > from, "ChebyshevPath::append_jets: to > from");
+  const std::size_t before = pieces();
+  if (before == 0) start_ = from;
+  std::vector<std::pair<double, int>> waiting = {{to, 0}};  // end and depth, nearest last
+  double at = from;
+  while (!waiting.empty()) {
+    const auto [end, depth] = waiting.back();
+    const double middle = 0.5 * (at + end), half = 0.5 * (end - at);
+    std::array<ChebyshevJet, kJets> jets;
+    Eigen::Matrix<double, Eigen::Dynamic, kJets, Eigen::ColMajor, 16, kJets> thirds;
+    for (int i = 0; i < kJets; ++i) {
+      auto jet = f(middle + half * node(i, kJets));
+      if (!jet) {
+        shorten(before);
+        return false;
+      }
+      if (i == 0) thirds.resize((*jet)[3].size(), kJets);
+      thirds.col(i) = (*jet)[3];
+      jets[static_cast<std::size_t>(i)] = std::move(*jet);
+    }
+    const ChebyshevJet& centre = jets[kJets / 2];
+    Values c = Values::Zero(thirds.rows(), kPoints);
+    c.leftCols<kJets>() = thirds * transform<kJets>();
+    const PathValue tail = c.middleCols<2>(kJets - 2).cwiseAbs().rowwise().maxCoeff();
+    bool resolved =
+        (tail.array() <=
+         settings.relative * thirds.cwiseAbs().rowwise().maxCoeff().array() + third.array())
+            .all();
+    c = integral(half * c, centre[2]);
+    const Values first = integral(half * c, centre[1]);
+    c = integral(half * first, centre[0]);
+    for (const int i : {0, kJets - 1}) {
+      const ChebyshevJet& wanted = jets[static_cast<std::size_t>(i)];
+      const Basis t = basis(node(i, kJets))[0];
+      const PathValue value = c * t, slope = first * t;
+      const auto range = (jets[0][0] - jets[kJets - 1][0]).array().abs();
+      resolved = resolved &&
+                 ((value - wanted[0]).array().abs() <= settings.value * (1.0 + range)).all() &&
+                 (slope - wanted[1]).norm() <= 1e-6 * (wanted[1].norm() + centre[1].norm());
+    }
+    if (resolved) {
       coefficients_.push_back(c);
       ends_.push_back(end);
       at = end;

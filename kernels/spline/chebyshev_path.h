@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <vector>
 
 namespace smoothpost {
@@ -20,12 +21,20 @@ struct ChebyshevSettings {
   int most_halvings = 24;
 };
 
+struct ChebyshevJetSettings {
+  double relative = 5e-4;  ///< of the largest third derivative of the component on a piece
+  double value = 1e-9;     ///< of 1 + the component's range on a piece
+  int most_halvings = 24;
+};
+
 /// A vector-valued function, replaced on each piece by its polynomial of degree 9 through the ten
 /// Chebyshev points of the piece. A piece is halved until the last two coefficients of every
 /// component are below relative · range + absolute, where range is half the difference of its
 /// largest and least value at the points.
 ///
-/// Made to have derivatives of a function that only gives values (inverse kinematics along a path).
+/// Derivatives of a function that only gives values (inverse kinematics along a path) come out
+/// with the rounding of the values times 3·10⁴ over the cube of the half length: useless on very
+/// short pieces. append_jets() takes a function that gives its derivatives and has no such limit.
 /// Analytic inside each given piece, so that the interpolant converges faster than any power; the
 /// third derivative of the interpolant differs from the function's by about 3·10⁴ times the
 /// tolerance over the cube of the piece's half length. Guarantees (tests): values and derivatives
@@ -39,6 +48,21 @@ class ChebyshevPath {
   /// @pre to > from; `f` is finite and always of the same size, at most 16.
   /// Cost: 10 values of `f` a piece that stays and a piece that is halved; 10 numbers a component.
   bool append(const Function& f, double from, double to, const ChebyshevSettings& settings);
+
+  /// A value with its derivatives; nothing where there are none.
+  using JetFunction = std::function<std::optional<ChebyshevJet>(double)>;
+
+  /// The same for a function that knows its derivatives: the third one is interpolated in seven
+  /// Chebyshev points and integrated three times from the middle of the piece, so that derivatives
+  /// have the function's own accuracy on pieces of any length. A piece is halved until the last two
+  /// coefficients of every component's third derivative are below relative · (its largest value)
+  /// + third[component], and value and first derivative at the outermost points are the function's
+  /// to value · (1 + range) and 1e-6 of the largest first derivative.
+  /// False, and nothing appended: not resolved after most_halvings, or `f` gave nothing.
+  /// @pre to > from; `f` is finite; third.size() is the size of its values.
+  /// Cost: 7 jets of `f` a piece that stays and a piece that is halved.
+  bool append_jets(const JetFunction& f, double from, double to, const PathValue& third,
+                   const ChebyshevJetSettings& settings);
 
   /// Drops everything behind the first `pieces` pieces.
   void shorten(std::size_t pieces);
@@ -60,6 +84,7 @@ class ChebyshevPath {
 
  private:
   static constexpr int kPoints = 10;
+  static constexpr int kJets = kPoints - 3;
   using Coefficients =
       Eigen::Matrix<double, Eigen::Dynamic, kPoints>;  ///< exactly as large as it is
 

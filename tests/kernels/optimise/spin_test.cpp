@@ -233,3 +233,19 @@ TEST_CASE("spin: preconditions", "[kernels][optimise][spin]") {
   CHECK_THROWS_AS(optimise_spin(robot, {}, 0.0), ContractViolation);
   CHECK_THROWS_AS(optimise_spin(robot, line(5), 0.0, 5), ContractViolation);
 }
+
+TEST_CASE("spin: derivatives of the profile are those of its values", "[kernels][optimise]") {
+  std::vector<double> c;
+  for (int i = 0; i < 12; ++i) c.push_back(std::sin(2.3 * i) + 0.1 * i);
+  const SpinProfile profile(c, 350.0);
+  const double h = 0.5;
+  for (double x = 3.0; x < 347.0; x += 7.7) {
+    const Jet jet = profile.jet(x), before = profile.jet(x - h), after = profile.jet(x + h);
+    CHECK(jet[0] == profile.at(x));
+    for (std::size_t r = 0; r < 3; ++r)  // the next derivative changes by its own at most
+      CHECK(jet[r + 1] == Approx((after[r] - before[r]) / (2.0 * h)).margin(2e-7));
+  }
+  CHECK(profile.jet(-1.0)[1] == 0.0);
+  CHECK(profile.jet(400.0)[1] == 0.0);
+  CHECK(SpinProfile({0.4}, 10.0).jet(3.0) == Jet{0.4, 0.0, 0.0, 0.0});
+}

@@ -288,7 +288,8 @@ TEST_CASE("corner_path: tolerance about the tool axis alone", "[kernels][smooth]
   }
 }
 
-TEST_CASE("corner_path: neighbours share a leg by their curvature", "[kernels][smooth]") {
+TEST_CASE("corner_path: neighbours share a leg so that their third derivatives are alike",
+          "[kernels][smooth]") {
   const double shallow = radians_from_degrees(20.0);
   PathText text;
   text.line(Vec3(10, 0, 0))
@@ -299,7 +300,9 @@ TEST_CASE("corner_path: neighbours share a leg by their curvature", "[kernels][s
   const double a = path.corners()[1].half_width;
   const double b = path.corners()[2].half_width;
   CHECK(a + b == Approx(2.0));
-  CHECK(a / b == Approx(k(kPi / 2) / k(shallow)));
+  CHECK(a / b == Approx(std::sqrt(k(kPi / 2) / k(shallow))));
+  // |r'''| ~ k/h² of both corners.
+  CHECK(k(kPi / 2) / (a * a) == Approx(k(shallow) / (b * b)));
 }
 
 TEST_CASE("corner_path: derivatives equal central differences", "[kernels][smooth]") {

@@ -88,3 +88,74 @@ TEST_CASE("chebyshev_path: its tail is the same function moved", "[kernels][spli
   for (double x = 0.0; x <= 8.0; x += 0.1)
     CHECK((tail.value(tail.piece_at(x), x) - f(x + 1.0)).norm() < 1e-6);
 }
+
+namespace {
+
+/// 1000 + 30 sin 3x and e^−x, with derivatives.
+std::optional<ChebyshevJet> waves(double x) {
+  const double s = 30.0 * std::sin(3.0 * x), c = 30.0 * std::cos(3.0 * x), e = std::exp(-x);
+  return ChebyshevJet{vector2(1000.0 + s, e), vector2(3.0 * c, -e), vector2(-9.0 * s, e),
+                      vector2(-27.0 * c, -e)};
+}
+
+double worst_error(const ChebyshevPath& path, std::size_t order, double from, double to) {
+  double worst = 0.0;
+  for (int k = 0; k <= 400; ++k) {
+    const double x = from + (to - from) * k / 400.0;
+    const ChebyshevJet jet = path.jet(path.piece_at(x), x);
+    worst = std::max(worst, (jet[order] - (*waves(x))[order]).cwiseAbs().maxCoeff());
+  }
+  return worst;
+}
+
+}  // namespace
+
+TEST_CASE("chebyshev_path: a function with derivatives keeps them, on pieces of any length",
+          "[kernels][spline]") {
+  const PathValue none = vector2(1e-9, 1e-9);
+  const ChebyshevJetSettings close{1e-5, 1e-9, 24};
+  ChebyshevPath path;
+  REQUIRE(path.append_jets(waves, 0.0, 2.0, none, close));
+  REQUIRE(path.append_jets(waves, 2.0, 2.0 + 1e-9, none, close));  // by values: noise of 1e14
+  REQUIRE(path.append_jets(waves, 2.0 + 1e-9, 5.0, none, close));
+  CHECK(worst_error(path, 0, 0.0, 5.0) < 1e-7);
+  CHECK(worst_error(path, 1, 0.0, 5.0) < 1e-5);
+  CHECK(worst_error(path, 2, 0.0, 5.0) < 1e-3);
+  CHECK(worst_error(path, 3, 0.0, 5.0) < 2e-2);
+  CHECK(worst_error(path, 3, 2.0, 2.0 + 1e-9) < 1e-5);
+}
+
+TEST_CASE("chebyshev_path: a polynomial of degree 9 with derivatives is one piece",
+          "[kernels][spline]") {
+  ChebyshevPath path;
+  const auto f = [](double x) {
+    return std::optional(
+        ChebyshevJet{vector2(std::pow(x, 9), 1.0 - x), vector2(9.0 * std::pow(x, 8), -1.0),
+                     vector2(72.0 * std::pow(x, 7), 0.0), vector2(504.0 * std::pow(x, 6), 0.0)});
+  };
+  REQUIRE(path.append_jets(f, -1.0, 1.0, vector2(1e30, 1e30), {}));
+  REQUIRE(path.pieces() == 1);
+  for (const double x : {-1.0, -0.3, 0.0, 0.8, 1.0})
+    for (std::size_t r = 0; r < 4; ++r)
+      CHECK((path.jet(0, x)[r] - (*f(x))[r]).norm() < 1e-12 * std::pow(10.0, r));
+}
+
+TEST_CASE("chebyshev_path: jumps of value and slope between equal third derivatives are found",
+          "[kernels][spline]") {
+  const auto zigzag = [](double slope, double jump) {
+    return [=](double x) {
+      const double behind = x < 0.37 ? 0.0 : 1.0;
+      return std::optional(ChebyshevJet{vector2(x + behind * (slope * (x - 0.37) + jump), 0.0),
+                                        vector2(1.0 + behind * slope, 0.0), vector2(0.0, 0.0),
+                                        vector2(0.0, 0.0)});
+    };
+  };
+  ChebyshevPath path;
+  const PathValue third = vector2(1.0, 1.0);
+  CHECK(path.append_jets(zigzag(0.0, 0.0), 0.0, 1.0, third, {}));
+  CHECK_FALSE(path.append_jets(zigzag(0.1, 0.0), 0.0, 1.0, third, {}));
+  CHECK_FALSE(path.append_jets(zigzag(0.0, 1e-3), 0.0, 1.0, third, {}));
+  CHECK_FALSE(
+      path.append_jets([](double) { return std::optional<ChebyshevJet>(); }, 1.0, 2.0, third, {}));
+  CHECK(path.pieces() == 1);
+}
