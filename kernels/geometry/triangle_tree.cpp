@@ -27,6 +27,28 @@ struct Facet {
   std::array<Vec3, 3> corner;
 };
 
+/// The facet's box in single precision, rounded outwards: what sorting needs, beside the index that
+/// is sorted, so that half a million facets are not looked up at each of twenty levels.
+struct SmallBox {
+  std::array<float, 3> lo, hi;
+
+  explicit SmallBox(const Facet& facet) {
+    const auto& [a, b, c] = facet.corner;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      lo[k] = below(std::min({a[i], b[i], c[i]}));
+      hi[k] = -below(-std::max({a[i], b[i], c[i]}));
+    }
+  }
+
+ private:
+  static float below(double value) {
+    const auto near = static_cast<float>(value);
+    if (static_cast<double>(near) <= value) return near;
+    return std::nextafter(near, -std::numeric_limits<float>::infinity());
+  }
+};
+
 /// What CGAL's tree sorts: a facet by its index.
 class FacetPrimitive {
  public:
@@ -34,18 +56,20 @@ class FacetPrimitive {
   using Point = Kernel::Point_3;
   using Datum = Kernel::Triangle_3;
 
-  FacetPrimitive(const Facet* facets, Id id) : facet_(facets + id), id_(id) {}
+  FacetPrimitive(const Facet* facets, Id id) : facet_(facets + id), id_(id), box_(facets[id]) {}
   Id id() const { return id_; }
   Datum datum() const {
     return Datum(point(facet_->corner[0]), point(facet_->corner[1]), point(facet_->corner[2]));
   }
   Point reference_point() const { return point(facet_->corner[0]); }
   const Facet& facet() const { return *facet_; }
+  const SmallBox& box() const { return box_; }
 
  private:
   static Point point(const Vec3& v) { return Point(v.x(), v.y(), v.z()); }
   const Facet* facet_;
   Id id_;
+  SmallBox box_;
 };
 
 using Traits = CGAL::AABB_traits<Kernel, FacetPrimitive>;
@@ -56,14 +80,14 @@ using Node = CGAL::AABB_node<Traits>;
 struct BoxOfRange {
   template <class Iterator>
   CGAL::Bbox_3 operator()(Iterator first, Iterator beyond) const {
-    Vec3 lo = Vec3::Constant(std::numeric_limits<double>::infinity());
-    Vec3 hi = -lo;
-    for (; first != beyond; ++first)
-      for (const Vec3& v : first->facet().corner) {
-        lo = lo.cwiseMin(v);
-        hi = hi.cwiseMax(v);
+    auto lo = first->box().lo;
+    auto hi = first->box().hi;
+    for (++first; first != beyond; ++first)
+      for (std::size_t k = 0; k < 3; ++k) {
+        lo[k] = std::min(lo[k], first->box().lo[k]);
+        hi[k] = std::max(hi[k], first->box().hi[k]);
       }
-    return {lo.x(), lo.y(), lo.z(), hi.x(), hi.y(), hi.z()};
+    return {lo[0], lo[1], lo[2], hi[0], hi[1], hi[2]};
   }
 };
 
@@ -71,17 +95,17 @@ struct BoxOfRange {
 struct SplitAtMedian {
   template <class Iterator>
   void operator()(Iterator first, Iterator beyond, const CGAL::Bbox_3& box) const {
-    int axis = 0;
+    int longest = 0;
     for (int k = 1; k < 3; ++k)
-      if (box.max(k) - box.min(k) > box.max(axis) - box.min(axis)) axis = k;
+      if (box.max(k) - box.min(k) > box.max(longest) - box.min(longest)) longest = k;
+    const auto axis = static_cast<std::size_t>(longest);
     const auto centre = [axis](const FacetPrimitive& p) {
-      const auto& c = p.facet().corner;
-      return c[0][axis] + c[1][axis] + c[2][axis];
+      return p.box().lo[axis] + p.box().hi[axis];
     };
     std::nth_element(first, first + (beyond - first) / 2, beyond,
                      [&](const FacetPrimitive& a, const FacetPrimitive& b) {
-                       const double ca = centre(a);
-                       const double cb = centre(b);
+                       const float ca = centre(a);
+                       const float cb = centre(b);
                        return ca != cb ? ca < cb : a.id() < b.id();
                      });
   }
@@ -183,6 +207,7 @@ struct TriangleTree::Impl {
   Vec3 min = Vec3::Zero();
   Vec3 max = Vec3::Zero();
   double signed_volume = 0.0;
+  bool solid = true;
   Tree tree;
 
   void take_facets(const TriangleMesh& mesh);
@@ -222,6 +247,7 @@ void TriangleTree::Impl::take_edges(const TriangleMesh& mesh) {
   for_each_edge(mesh, [&](const MeshEdge* begin, const MeshEdge* end) {
     const auto index = static_cast<std::uint32_t>(edge_normals.size());
     const bool open = end - begin == 1;
+    if (end - begin != 2 || begin->forward == (begin + 1)->forward) solid = false;
     Vec3 sum = Vec3::Zero();
     for (const MeshEdge* side = begin; side != end; ++side) {
       const auto facet = facet_of[side->triangle];
@@ -310,9 +336,58 @@ ClosestPoint TriangleTree::closest(const Vec3& query, std::uint32_t hint) const 
   return impl_->closest(query, facet == kNone ? 0 : facet);
 }
 
+// A part of one triangle points to its facet, a larger one to its node; the node knows neither
+// itself nor its children's kind without the number of triangles (CGAL's AABB_node).
+TreePart TriangleTree::whole() const {
+  const auto size = static_cast<std::uint32_t>(impl_->facets.size());
+  if (size == 1) return {impl_->facets.data(), 1};
+  return {impl_->tree.root_node(), size};
+}
+
+std::pair<TreePart, TreePart> TriangleTree::halves(const TreePart& part) const {
+  const Node& node = *static_cast<const Node*>(part.at_);
+  switch (part.size_) {
+    case 2:
+      return {{&node.left_data().facet(), 1}, {&node.right_data().facet(), 1}};
+    case 3:
+      return {{&node.left_data().facet(), 1}, {&node.right_child(), 2}};
+    default:
+      const std::uint32_t half = part.size_ / 2;
+      return {{&node.left_child(), half}, {&node.right_child(), part.size_ - half}};
+  }
+}
+
+MeshBox TriangleTree::box(const TreePart& part) const {
+  if (part.size_ == 1) {
+    const auto& c = corners(part);
+    const Vec3 lo = c[0].cwiseMin(c[1]).cwiseMin(c[2]);
+    const Vec3 hi = c[0].cwiseMax(c[1]).cwiseMax(c[2]);
+    return {0.5 * (lo + hi), 0.5 * (hi - lo)};
+  }
+  const CGAL::Bbox_3& b = static_cast<const Node*>(part.at_)->bbox();
+  return {0.5 * Vec3(b.xmin() + b.xmax(), b.ymin() + b.ymax(), b.zmin() + b.zmax()),
+          0.5 * Vec3(b.xmax() - b.xmin(), b.ymax() - b.ymin(), b.zmax() - b.zmin())};
+}
+
+const std::array<Vec3, 3>& TriangleTree::corners(const TreePart& part) const {
+  return static_cast<const Facet*>(part.at_)->corner;
+}
+
+std::uint32_t TriangleTree::triangle(const TreePart& part) const {
+  return impl_->triangle[static_cast<const Facet*>(part.at_) - impl_->facets.data()];
+}
+
+std::optional<TreePart> TriangleTree::part_of(std::uint32_t triangle) const {
+  require(triangle < impl_->facet_of.size(), "a triangle of the mesh");
+  const auto facet = impl_->facet_of[triangle];
+  if (facet == kNone) return std::nullopt;
+  return TreePart(impl_->facets.data() + facet, 1);
+}
+
 const Vec3& TriangleTree::min() const { return impl_->min; }
 const Vec3& TriangleTree::max() const { return impl_->max; }
 std::size_t TriangleTree::size() const { return impl_->facets.size(); }
+bool TriangleTree::solid() const { return impl_->solid; }
 bool TriangleTree::open() const {
   return std::find(impl_->edge_open.begin(), impl_->edge_open.end(), 1) != impl_->edge_open.end();
 }
@@ -343,6 +418,7 @@ namespace smoothpost {
 
 struct TriangleTree::Impl {
   Vec3 zero = Vec3::Zero();
+  std::array<Vec3, 3> corners = {zero, zero, zero};
 };
 
 TriangleTree::TriangleTree(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -361,6 +437,15 @@ ClosestPoint TriangleTree::closest(const Vec3& query, std::uint32_t) const {
 const Vec3& TriangleTree::min() const { return impl_->zero; }
 const Vec3& TriangleTree::max() const { return impl_->zero; }
 std::size_t TriangleTree::size() const { return 0; }
+bool TriangleTree::solid() const { return false; }
+TreePart TriangleTree::whole() const { return {nullptr, 0}; }
+std::pair<TreePart, TreePart> TriangleTree::halves(const TreePart& part) const {
+  return {part, part};
+}
+MeshBox TriangleTree::box(const TreePart&) const { return {}; }
+const std::array<Vec3, 3>& TriangleTree::corners(const TreePart&) const { return impl_->corners; }
+std::uint32_t TriangleTree::triangle(const TreePart&) const { return 0; }
+std::optional<TreePart> TriangleTree::part_of(std::uint32_t) const { return std::nullopt; }
 bool TriangleTree::open() const { return false; }
 double TriangleTree::signed_volume() const { return 0.0; }
 

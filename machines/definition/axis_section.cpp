@@ -136,6 +136,9 @@ AxisDefinition read_axis(const TomlValue& item, Problems& problems) {
     axis.name = *name;
     if (!is_name(*name))
       reader.error("MF113", "an axis name is a letter, then letters, digits or _", "name");
+    if (*name == "base" || *name == "workpiece")
+      reader.error("MF112", *name + " is a link of every machine: give the axis another name",
+                   "name");
   }
   if (const auto letter = reader.required().text("letter")) {
     if (letter->size() == 1 && (*letter)[0] >= 'A' && (*letter)[0] <= 'Z')

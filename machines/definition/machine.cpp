@@ -24,6 +24,15 @@ int index_where(const std::vector<AxisDefinition>& axes, Predicate predicate) {
 
 }  // namespace
 
+double PowerTable::at(double tip_speed) const {
+  const auto above = std::upper_bound(speed.begin(), speed.end(), tip_speed);
+  if (above == speed.begin()) return percent.front();
+  if (above == speed.end()) return percent.back();
+  const auto i = static_cast<std::size_t>(above - speed.begin());
+  const double t = (tip_speed - speed[i - 1]) / (speed[i] - speed[i - 1]);
+  return percent[i - 1] + t * (percent[i] - percent[i - 1]);
+}
+
 int MachineDefinition::axis_by_letter(char letter) const {
   return index_where(axes, [&](const AxisDefinition& axis) { return axis.letter == letter; });
 }

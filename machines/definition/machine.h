@@ -3,6 +3,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "kernels/core/body.h"
@@ -50,6 +51,18 @@ struct WorkpieceDefinition {
   double thickness = 0.0;
 };
 
+/// A pair of bodies, by name ("part" is the part), whose least distance is stated for the pair.
+struct PairClearance {
+  std::string first;
+  std::string second;
+  double clearance = 0.0;  ///< mm
+};
+
+struct CollisionSettings {
+  std::vector<std::pair<std::string, std::string>> allowed;  ///< pairs that are never checked
+  std::vector<PairClearance> pairs;
+};
+
 struct CycleSettings {
   double time = 0.001;       ///< s, the controller's cycle
   double min_block = 0.004;  ///< s
@@ -93,8 +106,8 @@ struct ToleranceSettings {
   /// mm, that a tilted beam may shift the cut's edge on the far side of the sheet; nothing: what
   /// the tilt tolerance implies
   std::optional<double> exit_edge;
-  double clearance = 0.0;
-  double event = 0.5;  ///< mm along the path that an event on the fly may be off its place
+  double clearance = 0.0;  ///< mm, least distance of bodies that state none of their own
+  double event = 0.5;      ///< mm along the path that an event on the fly may be off its place
   double limit_share =
       1.0;  ///< share of the velocity, acceleration and jerk limits that we plan with
   ToleranceBudget budget;
@@ -141,6 +154,11 @@ struct PowerTable {
   std::vector<double> percent;
   double min_percent = 0.0;
   double min_cut_speed = 0.0;
+  bool by_program = true;  ///< false: the control derives the power from the tip's speed itself
+  double error = 30.0;  ///< percent: largest distance of a commanded power from that of the speed
+
+  /// Between the points linearly, beyond them the nearest.   @pre a table
+  double at(double tip_speed) const;
 };
 
 struct MachineDefinition {
@@ -150,6 +168,7 @@ struct MachineDefinition {
   ToolDefinition tool;
   WorkpieceDefinition workpiece;
   std::vector<Body> bodies;
+  CollisionSettings collision;
   CycleSettings cycle;
   StandoffSettings standoff;
   LinkSettings links;

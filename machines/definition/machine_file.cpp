@@ -1,7 +1,9 @@
 #include "machines/definition/machine_file.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "machines/definition/sections.h"
@@ -67,12 +69,13 @@ class Reader {
     const auto items = read_axes(machine);
     machine.tool = read_tool(root_.table("tool", "[tool]"));
     machine.workpiece = read_workpiece(root_.table("workpiece", "[workpiece]"));
-    read_bodies(machine);
     machine.cycle = read_cycle(root_.table("cycle", "[cycle]"));
     machine.standoff = read_standoff(root_.table("standoff", "[standoff]"), machine.axes);
     machine.links = read_links(root_.table("links", "[links]"), machine.axes);
     machine.recipe = read_recipe(root_.table("recipe", "[recipe]"));
     machine.tolerance = read_tolerance(root_.table("tolerance", "[tolerance]"), machine.recipe);
+    read_bodies(machine);
+    machine.collision = read_collision(root_.table("collision", "[collision]"), machine, problems_);
     machine.dialect = read_dialect(root_.table("dialect", "[dialect]"), machine.cycle);
     check_axes(machine.axes, items, machine.dialect.name, problems_);
     TableReader process = root_.table("process", "[process]");
@@ -114,12 +117,14 @@ class Reader {
                       items[kMaxBodies]->where);
       items.resize(kMaxBodies);
     }
+    const BodyContext context{
+        machine.axes, machine.tolerance.clearance,
+        std::filesystem::path(root_.where().file).parent_path().generic_string()};
+    std::set<std::string> names;
     for (const auto* item : items) {
-      Body body = read_body(*item, machine.axes, problems_);
-      const bool taken = std::any_of(machine.bodies.begin(), machine.bodies.end(),
-                                     [&](const Body& other) { return other.name == body.name; });
+      Body body = read_body(*item, context, problems_);
       const TomlEntry* name = item->table.find("name");
-      if (taken && name != nullptr)
+      if (name != nullptr && !body.name.empty() && !names.insert(body.name).second)
         problems_.error("MF112", "body name " + body.name.substr(0, 64) + " is taken",
                         name->value.where);
       machine.bodies.push_back(std::move(body));

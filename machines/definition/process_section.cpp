@@ -142,6 +142,8 @@ PowerTable read_power(TableReader reader) {
     reader.error("MF108", "min_percent is " + to_text(power.min_percent) + ": at most 100",
                  "min_percent");
   power.min_cut_speed = reader.number_or("min_cut_speed_mm_per_s", 0.0, Bound::not_negative);
+  power.by_program = reader.choice("follows", {"program", "control"}) != "control";
+  power.error = reader.number_or("error_percent", 30.0, Bound::positive);
   reader.finish();
   return power;
 }

@@ -20,7 +20,16 @@ void check_axes(const std::vector<AxisDefinition>& axes, const std::vector<const
 
 ToolDefinition read_tool(TableReader reader);
 WorkpieceDefinition read_workpiece(TableReader reader);
-Body read_body(const TomlValue& item, const std::vector<AxisDefinition>& axes, Problems& problems);
+
+/// What a [[body]] refers to.
+struct BodyContext {
+  const std::vector<AxisDefinition>& axes;
+  double clearance = 0.0;  ///< mm, of bodies that state none
+  std::string folder;      ///< of the machine file: where the paths of meshes start
+};
+Body read_body(const TomlValue& item, const BodyContext& context, Problems& problems);
+CollisionSettings read_collision(TableReader reader, const MachineDefinition& machine,
+                                 Problems& problems);
 CycleSettings read_cycle(TableReader reader);
 StandoffSettings read_standoff(TableReader reader, const std::vector<AxisDefinition>& axes);
 LinkSettings read_links(TableReader reader, const std::vector<AxisDefinition>& axes);

@@ -100,56 +100,6 @@ WorkpieceDefinition read_workpiece(TableReader reader) {
   return workpiece;
 }
 
-namespace {
-
-void read_radii(TableReader& reader, Body& body) {
-  const TomlEntry* entry = reader.entry("radius_mm");
-  const bool single = entry != nullptr && entry->value.is_number();
-  if (single) {
-    body.radius_from = reader.number_or("radius_mm", 1.0, Bound::not_negative);
-    body.radius_to = body.radius_from;
-  } else {
-    const auto radii = reader.required().numbers("radius_mm", 2);
-    if (!radii) return;
-    body.radius_from = (*radii)[0];
-    body.radius_to = (*radii)[1];
-  }
-  if (body.radius_from < 0.0 || body.radius_to < 0.0 || body.radius_from + body.radius_to <= 0.0)
-    reader.error("MF108", "radius_mm has to be at least 0 at both ends and more at one",
-                 "radius_mm");
-  else if (body.shape != BodyShape::frustum && body.radius_from != body.radius_to)
-    reader.error("MF124", "radius_mm: only a frustum has two different radii", "radius_mm");
-}
-
-}  // namespace
-
-Body read_body(const TomlValue& item, const std::vector<AxisDefinition>& axes, Problems& problems) {
-  TableReader reader(&item.table, "[[body]]", item.where, problems);
-  Body body;
-  body.name = reader.required().text("name").value_or("");
-  body.link = reader.required().text("link").value_or("base");
-  if (body.link != "base" && axis_named(axes, body.link) == nullptr)
-    reader.error("MF114",
-                 "link names no axis of this machine: " + body.link.substr(0, 64) + "; there are " +
-                     one_of(names_of(axes)) + ", and base",
-                 "link");
-  const auto shape = reader.required().choice("shape", {"frustum", "cylinder", "capsule", "box"});
-  if (shape == "frustum") body.shape = BodyShape::frustum;
-  if (shape == "capsule") body.shape = BodyShape::capsule;
-  if (shape == "box") body.shape = BodyShape::box;
-  const auto from = reader.required().vector("from_mm");
-  const auto to = reader.required().vector("to_mm");
-  body.from = from.value_or(Vec3::Zero());
-  body.to = to.value_or(Vec3::UnitZ());
-  if (from && to && *from == *to)
-    reader.error("MF124", "to_mm is the same point as from_mm",
-                 blame(reader, {"from_mm", "to_mm"}));
-  if (shape && body.shape != BodyShape::box) read_radii(reader, body);
-  if (!shape) reader.entry("radius_mm");
-  reader.finish();
-  return body;
-}
-
 CycleSettings read_cycle(TableReader reader) {
   CycleSettings cycle;
   cycle.time = reader.number_or("time_ms", 1.0, Bound::positive) * kSecondsPerMillisecond;

@@ -246,6 +246,58 @@ std::optional<Vec3> TableReader::vector(std::string_view key) {
   return Vec3((*values)[0], (*values)[1], (*values)[2]);
 }
 
+std::optional<std::vector<Vec3>> TableReader::vectors(std::string_view key, std::size_t most) {
+  const TomlEntry* found = take(key, TomlKind::array);
+  if (found == nullptr) return std::nullopt;
+  const auto& items = found->value.items;
+  if (items.size() > most) {
+    problems_->error("MF119",
+                     std::string(key) + " has " + std::to_string(items.size()) +
+                         " points; at most " + std::to_string(most) + " can be used",
+                     items[most].where);
+    return std::nullopt;
+  }
+  std::vector<Vec3> points;
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    const std::string what = "item " + std::to_string(i + 1) + " of " + std::string(key);
+    if (items[i].kind != TomlKind::array || items[i].items.size() != 3) {
+      problems_->error("MF106", what + " has to be a list of 3 numbers", items[i].where);
+      return std::nullopt;
+    }
+    Vec3 point;
+    for (int k = 0; k < 3; ++k) {
+      const auto value = finite(items[i].items[static_cast<std::size_t>(k)], "a number of " + what);
+      if (!value) return std::nullopt;
+      point[k] = *value;
+    }
+    points.push_back(point);
+  }
+  return points;
+}
+
+bool TableReader::is_pair(const TomlValue& value, const std::string& what) {
+  const auto is_text = [](const TomlValue& item) { return item.kind == TomlKind::string; };
+  const bool good = value.kind == TomlKind::array && value.items.size() == 2 &&
+                    is_text(value.items[0]) && is_text(value.items[1]);
+  if (!good)
+    problems_->error("MF106", what + " has to be a list of 2 strings: [\"a\", \"b\"]", value.where);
+  return good;
+}
+
+std::vector<const TomlValue*> TableReader::pairs(std::string_view key) {
+  std::vector<const TomlValue*> out;
+  const TomlEntry* found = take(key, TomlKind::array);
+  if (found == nullptr) return out;
+  for (const auto& item : found->value.items)
+    if (is_pair(item, "every item of " + std::string(key))) out.push_back(&item);
+  return out;
+}
+
+const TomlValue* TableReader::pair(std::string_view key) {
+  const TomlEntry* found = take(key, TomlKind::array);
+  return found != nullptr && is_pair(found->value, std::string(key)) ? &found->value : nullptr;
+}
+
 std::optional<Vec3> TableReader::direction(std::string_view key) {
   const auto value = vector(key);
   if (!value) return std::nullopt;

@@ -60,6 +60,12 @@ class TableReader {
   /// Any count of finite numbers.
   std::optional<std::vector<double>> numbers(std::string_view key);
   std::optional<Vec3> vector(std::string_view key);
+  /// A list of at most `most` lists of 3 finite numbers.
+  std::optional<std::vector<Vec3>> vectors(std::string_view key, std::size_t most);
+  /// A list of lists of 2 strings; items that are not are errors and left out.
+  std::vector<const TomlValue*> pairs(std::string_view key);
+  /// The value of `key` when it is a list of 2 strings, else nullptr.
+  const TomlValue* pair(std::string_view key);
   /// Normalised; a zero vector is an error.
   std::optional<Vec3> direction(std::string_view key);
   std::optional<std::vector<std::string>> lines(std::string_view key);
@@ -86,6 +92,7 @@ class TableReader {
  private:
   const TomlEntry* take(std::string_view key, TomlKind kind);
   std::optional<double> finite(const TomlValue& value, const std::string& what);
+  bool is_pair(const TomlValue& value, const std::string& what);
   void report_unknown(const TomlEntry& entry);
   bool has_other_unit(std::string_view key) const;
 

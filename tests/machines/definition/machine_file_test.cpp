@@ -512,6 +512,18 @@ TEST_CASE("machine file: power table", "[machines][definition]") {
   CHECK(m.power.percent == std::vector<double>{20, 60, 60});
   CHECK(m.power.min_percent == 20.0);
   CHECK(m.power.min_cut_speed == 5.0);
+  CHECK(m.power.by_program);
+  CHECK(m.power.error == 30.0);
+  CHECK(m.power.at(-1.0) == 20.0);
+  CHECK(m.power.at(25.0) == Approx(40.0));
+  CHECK(m.power.at(75.0) == 60.0);
+  CHECK(m.power.at(1e9) == 60.0);
+  const std::string plain = table("[0, 50]", "[20, 60]");
+  const MachineDefinition control = parse(plain + "follows = \"control\"\nerror_percent = 2.5\n");
+  CHECK_FALSE(control.power.by_program);
+  CHECK(control.power.error == 2.5);
+  check_value(plain + "follows = \"nobody\"\n", "MF113", "follows = \"nobody\"");
+  check_value(plain + "error_percent = 0\n", "MF108", "error_percent = 0");
   check_value(table("[0, 50, 50]", "[20, 60, 70]"), "MF117", "speed_mm_per_s = [0, 50, 50]");
   check_value(table("[-1, 50, 60]", "[20, 60, 70]"), "MF117", "speed_mm_per_s = [-1, 50, 60]");
   check_value(table("[0, 50, 60]", "[20, 60, 50]"), "MF117", "percent = [20, 60, 50]");
