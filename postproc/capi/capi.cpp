@@ -56,6 +56,10 @@ Options options_of(const smoothpost_options& o) {
   out.input_format = text(o.input_format);
   out.input_dialect = text(o.input_dialect);
   out.integer_unit = text(o.integer_unit);
+  out.input_unit = text(o.input_unit);
+  out.input_feed = text(o.input_feed);
+  out.cl_frames = text(o.cl_frames);
+  out.cl_circles = text(o.cl_circles);
   out.input_machine = text(o.input_machine);
   out.process = text(o.process);
   out.work_offset = list(o.work_offset, o.work_offset_count);

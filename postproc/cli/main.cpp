@@ -81,6 +81,10 @@ struct CallOptions {
     c.input_format = or_null(l.input_format);
     c.input_dialect = or_null(l.input_dialect);
     c.integer_unit = or_null(l.integer_unit);
+    c.input_unit = or_null(l.input_unit);
+    c.input_feed = or_null(l.input_feed);
+    c.cl_frames = or_null(l.cl_frames);
+    c.cl_circles = or_null(l.cl_circles);
     c.input_machine = or_null(l.input_machine);
     c.process = or_null(l.process);
     c.work_offset = work_offset.data();

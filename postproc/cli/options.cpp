@@ -45,11 +45,20 @@ void add_part_options(CLI::App* app, CommandLine& l) {
 
 // How a CAM program is to be read, and how closely it is to be followed.
 void add_input_options(CLI::App* app, CommandLine& l) {
-  app->add_option("--input-format", l.input_format, "nc | csv");
+  app->add_option("--input-format", l.input_format, "nc | cl | csv");
   app->add_option("--input-dialect", l.input_dialect,
                   "linuxcnc | fanuc | haas | siemens; found out when only one fits");
   app->add_option("--integer-unit", l.integer_unit,
                   "fanuc, haas: what one unit of a number without point is, 1 or 0.001 (mm, deg)");
+  app->add_option("--input-unit", l.input_unit,
+                  "cl: unit of lengths before UNITS, mm or inch; no default");
+  app->add_option("--input-feed", l.input_feed,
+                  "cl: feed of motions before the first FEDRAT, mm/min; no default");
+  app->add_option(
+      "--cl-frames", l.cl_frames,
+      "cl: what MSYS and CSYS do: one (a second frame is refused) | reported | applied");
+  app->add_option("--cl-circles", l.cl_circles,
+                  "cl: CIRCLE of the NX form about its axis: tangents (found out) | cw | ccw");
   app->add_option("--input-machine", l.input_machine,
                   "the machine that the input was posted for; needed for rotary words");
   app->add_option("--process", l.process,
@@ -76,7 +85,7 @@ void add_search_options(CLI::App* app, CommandLine& l) {
 void add_convert(CLI::App& app, CommandLine& l) {
   auto* c = app.add_subcommand("convert", "a CAM program to a certified machine program");
   c->footer(kExample);
-  c->add_option("input", l.input, "NC program or CSV; - for standard input")->required();
+  c->add_option("input", l.input, "NC program, CL data or CSV; - for standard input")->required();
   add_machine_options(c, l);
   c->add_option("-o,--output", l.output, "the program; - for standard output");
   add_part_options(c, l);
@@ -97,14 +106,15 @@ void add_convert(CLI::App& app, CommandLine& l) {
   c->add_option("--trajectory", l.trajectory,
                 "write joint samples at the machine's cycle to FILE.csv");
   c->add_option("--line-map", l.line_map, "write output line -> input line to FILE.json");
-  c->add_flag("--no-collision-check", l.no_collision_check, "this version makes none");
+  c->add_flag("--no-collision-check", l.no_collision_check,
+              "leave the clearance of the machine's bodies unchecked");
   c->add_flag("--force", l.force, "write a refused program too, marked NOT CERTIFIED");
   add_output_options(c, l);
 }
 
 void add_place(CLI::App& app, CommandLine& l) {
   auto* c = app.add_subcommand("place", "where to put the part: prints a --work-offset");
-  c->add_option("input", l.input, "NC program or CSV; - for standard input")->required();
+  c->add_option("input", l.input, "NC program, CL data or CSV; - for standard input")->required();
   add_machine_options(c, l);
   add_part_options(c, l);
   add_search_options(c, l);

@@ -8,6 +8,7 @@
 #include "formats/mesh/stl_reader.h"
 #include "kernels/core/contract.h"
 #include "kernels/core/units.h"
+#include "kernels/geometry/mesh_report.h"
 #include "kernels/geometry/weld.h"
 #include "machines/dialects/decimal.h"
 #include "postproc/jobs/files.h"
@@ -46,6 +47,7 @@ class Run {
     ConvertInput in;
     if (!read_convert_input(in)) return finish();
     in.timed = !options_.trajectory.empty();
+    in.collision_check = !options_.no_collision_check;
     std::optional<Conversion> made;
     if (automatic())
       made = convert_at_best_place(in, options_.force);
@@ -90,6 +92,7 @@ class Run {
     in.text = std::move(input_bytes_);
     if (!options_.against.empty() && !read_against(in)) return finish();
     in.file_name = input_name_;
+    in.collision_check = !options_.no_collision_check;
     in.machine = machine_.definition;
     context_.input_lines =
         static_cast<std::size_t>(std::count(in.text.begin(), in.text.end(), '\n'));
@@ -250,11 +253,12 @@ class Run {
                                     ? format_by_extension(name)
                                     : find_input_format(options_.input_format);
     if (!format) {
-      add(usage_error("US103", options_.input_format.empty()
-                                   ? "the format of " + name +
-                                         " cannot be told from its name: say --input-format nc|csv"
-                                   : "--input-format " + options_.input_format +
-                                         " is not read in this version; possible: csv, nc"));
+      add(usage_error("US103",
+                      options_.input_format.empty()
+                          ? "the format of " + name +
+                                " cannot be told from its name: say --input-format nc|cl|csv"
+                          : "--input-format " + options_.input_format +
+                                " is not read in this version; possible: cl, csv, nc"));
       return {};
     }
     context_.input_format = format->name;
@@ -289,6 +293,10 @@ class Run {
 
   bool input_settings(InputSettings& settings) {
     if (!read_dialect(settings)) return false;
+    auto cl = read_cl_options(options_);
+    add(cl.diagnostics());
+    if (!cl.ok()) return false;
+    settings.cl = std::move(cl.value());
     if (!options_.input_machine.empty()) {
       auto machine = load_machine(options_.input_machine, options_, {});
       add(machine.diagnostics());
@@ -390,6 +398,7 @@ class Run {
     if (!stl.ok()) return false;
     part = weld(stl.value().corners);
     add(mesh_findings(describe(*part), part_name));
+    add(surface_findings(report_surface(*part), part_name));
     return true;
   }
 
@@ -556,7 +565,8 @@ ExitStatus status_of(const Diagnostics& diagnostics) {
       internal = true;
     else if (family == "US")
       usage = true;
-    else if (family == "NC" || family == "CSV" || family == "STL" || family == "MF")
+    else if (family == "NC" || family == "CL" || family == "CSV" || family == "STL" ||
+             family == "MF")
       unreadable = true;
     else
       refused = true;

@@ -8,7 +8,9 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "formats/mesh/stl_reader.h"
 #include "kernels/core/units.h"
+#include "kernels/geometry/weld.h"
 #include "postproc/jobs/files.h"
 
 namespace smoothpost {
@@ -25,6 +27,23 @@ std::vector<std::string> split(std::string_view text, char separator) {
     if (at == std::string_view::npos) return parts;
     text.remove_prefix(at + 1);
   }
+}
+
+// Meshes of bodies: read, scaled and put into M.
+Diagnostics load_body_meshes(MachineDefinition& machine) {
+  for (Body& body : machine.bodies) {
+    if (body.shape != BodyShape::mesh || body.mesh) continue;
+    const auto bytes = read_file(body.mesh_file);
+    if (!bytes.ok()) return bytes.diagnostics();
+    StlSettings settings;
+    settings.scale = body.mesh_scale;
+    const auto stl = read_stl(bytes.value(), body.mesh_file, settings);
+    if (!stl.ok()) return stl.diagnostics();
+    TriangleMesh mesh = weld(stl.value().corners);
+    for (Vec3& v : mesh.vertices) v = body.mesh_frame * v;
+    body.mesh = std::make_shared<const TriangleMesh>(std::move(mesh));
+  }
+  return {};
 }
 
 // The folder of the library or program that holds this code.
@@ -103,6 +122,8 @@ Result<LoadedMachine> load_machine(const std::string& name_or_file, const Option
   if (!bytes.ok()) return Result<LoadedMachine>::failure(bytes.diagnostics());
   auto machine = parse_machine_file(bytes.value(), path, overrides);
   if (!machine.ok()) return Result<LoadedMachine>::failure(machine.diagnostics());
+  if (const Diagnostics problems = load_body_meshes(machine.value()); !problems.empty())
+    return Result<LoadedMachine>::failure(problems);
   return Result<LoadedMachine>({std::move(machine.value()), path, std::move(bytes.value())},
                                machine.diagnostics());
 }
@@ -194,6 +215,40 @@ std::optional<ToolOption> read_tool(const std::string& text) {
 }
 
 }  // namespace
+
+Result<cl::ReaderSettings> read_cl_options(const Options& options) {
+  cl::ReaderSettings settings;
+  Diagnostics errors;
+  const auto wrong = [&errors](const char* code, const std::string& option, const std::string& text,
+                               const char* expected) {
+    errors.push_back(usage_error(code, option + " " + text + ": expected is " + expected));
+  };
+  if (options.input_unit == "mm" || options.input_unit == "inch")
+    settings.unit = options.input_unit == "mm" ? 1.0 : kMillimetresPerInch;
+  else if (!options.input_unit.empty())
+    wrong("US162", "--input-unit", options.input_unit, "mm or inch");
+  if (!options.input_feed.empty()) {
+    const auto feed = read_number(options.input_feed);
+    if (feed && *feed >= 0.001 && *feed <= 1.0e6)
+      settings.feed = *feed / kSecondsPerMinute;
+    else
+      wrong("US163", "--input-feed", options.input_feed, "mm/min, 0.001 to 1000000");
+  }
+  if (options.cl_frames == "reported")
+    settings.frames = cl::FrameRule::reported;
+  else if (options.cl_frames == "applied")
+    settings.frames = cl::FrameRule::applied;
+  else if (!options.cl_frames.empty() && options.cl_frames != "one")
+    wrong("US164", "--cl-frames", options.cl_frames, "one, reported or applied");
+  if (options.cl_circles == "cw")
+    settings.nx_circles = cl::NxCircleSense::clockwise;
+  else if (options.cl_circles == "ccw")
+    settings.nx_circles = cl::NxCircleSense::counter_clockwise;
+  else if (!options.cl_circles.empty() && options.cl_circles != "tangents")
+    wrong("US165", "--cl-circles", options.cl_circles, "tangents, cw or ccw");
+  if (!errors.empty()) return Result<cl::ReaderSettings>::failure(std::move(errors));
+  return settings;
+}
 
 Result<ToolTable> read_tools(const std::vector<std::string>& texts) {
   ToolTable tools;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/cl/reader.h"
 #include "formats/nc/interpreter.h"
 #include "kernels/core/result.h"
 #include "machines/definition/machine.h"
@@ -48,6 +49,9 @@ struct ToolTable {
 
 /// --tool N=length or NAME:N=length, repeated. US143.
 Result<ToolTable> read_tools(const std::vector<std::string>& texts);
+
+/// --input-unit, --input-feed, --cl-frames, --cl-circles. US162 to US165.
+Result<cl::ReaderSettings> read_cl_options(const Options& options);
 
 /// A finite decimal number; nothing for anything else.
 std::optional<double> read_number(std::string_view text);

@@ -33,6 +33,26 @@ Mat3 least_rotation(const Vec3& a, const Vec3& b) {
   return Eigen::Quaterniond::FromTwoVectors(a, b).toRotationMatrix();
 }
 
+/// The same for a turning b: c·1 + [a × b] + (a × b)(a × b)ᵀ/(1 + c), c = a·b.
+MatrixJet least_rotation_jet(const Vec3& a, const VectorJet& b) {
+  Jet c{}, shifted{};
+  for (std::size_t r = 0; r < 4; ++r) {
+    c[r] = a.dot(b.col(static_cast<Eigen::Index>(r)));
+    shifted[r] = c[r] + (r == 0 ? 1.0 : 0.0);
+  }
+  const VectorJet v = cross_matrix(a) * b;
+  const VectorJet scaled = product(reciprocal(shifted), v);
+  MatrixJet out;
+  for (std::size_t r = 0; r < 4; ++r) {
+    const auto i = static_cast<Eigen::Index>(r);
+    out[r] = c[r] * Mat3::Identity() + cross_matrix(v.col(i));
+    for (std::size_t s = 0; s <= r; ++s)
+      out[r] += kLeibniz[r][s] * scaled.col(static_cast<Eigen::Index>(s)) *
+                v.col(static_cast<Eigen::Index>(r - s)).transpose();
+  }
+  return out;
+}
+
 class ArmPlanner {
  public:
   ArmPlanner(const SmoothedPath& path, const SixR& arm, const JointPlanSettings& settings,
@@ -72,7 +92,53 @@ class ArmPlanner {
     return inverse_.nearest(holder(leg, share, spin_), near);
   }
 
+  std::optional<JointJet> jet_on_leg(std::size_t leg, double share, const JointJet& near) const {
+    const std::optional<PoseJet> pose = path_.jet(leg, share);
+    if (!pose) return {};
+    const auto q = inverse_.nearest(holder(leg, share, spin_), near.col(0));
+    if (!q) return {};
+    JointJet known = JointJet::Zero(q->size(), 4);
+    known.col(0) = *q;
+    FreeJoints free{};
+    free.fill(true);
+    return joint_jet(arm_.chain(), known, free, holder_jet(leg, share, *pose));
+  }
+
  private:
+  /// holder() with derivatives by the share of a leg.
+  PoseJet holder_jet(std::size_t leg, double share, const PoseJet& pose) const {
+    PoseJet out;
+    if (settings_.whole_rotation) {
+      for (std::size_t r = 0; r < 4; ++r)
+        out.rotation[r] = pose.rotation[r] * from_input_.transpose();
+    } else {
+      VectorJet axis;
+      for (std::size_t r = 0; r < 4; ++r)
+        axis.col(static_cast<Eigen::Index>(r)) = pose.rotation[r].col(2);
+      out.rotation = product(least_rotation_jet(reference_axis_, axis), spin_jet(leg, share));
+    }
+    out.tip = pose.tip;
+    for (std::size_t r = 0; r < 4; ++r)
+      out.tip.col(static_cast<Eigen::Index>(r)) +=
+          path_.point(leg).tool_length * (out.rotation[r] * arm_.chain().tool_axis);
+    return out;
+  }
+
+  // The rotation about the reference axis, in front of home_.
+  MatrixJet spin_jet(std::size_t leg, double share) const {
+    if (!profile_) return constant_matrix_jet(rotation_about(reference_axis_, spin_) * home_);
+    Jet angle = profile_->jet(length_at(leg, share));
+    const double way = leg_start_[leg + 1] - leg_start_[leg];
+    angle = {spin_ + angle[0], way * angle[1], way * way * angle[2], way * way * way * angle[3]};
+    const SineCosine turn = sine_cosine(angle);
+    MatrixJet out;
+    for (int c = 0; c < 3; ++c) {
+      const VectorJet column = turned(reference_axis_, turn, constant_jet(Vec3(home_.col(c))));
+      for (std::size_t r = 0; r < 4; ++r) out[r].col(c) = column.col(static_cast<Eigen::Index>(r));
+    }
+    return out;
+  }
+
   Result<JointPlan> plan_optimised(double spin) {
     std::vector<SpinPoint> points;
     for (const JointSample& t : thinned()) {
@@ -441,10 +507,14 @@ Result<JointPlan> plan_arm(const SmoothedPath& path, const SixR& arm,
                            const JointPlanSettings& settings, const Progress& progress) {
   const auto planner = std::make_shared<ArmPlanner>(path, arm, settings, progress);
   Result<JointPlan> plan = planner->run();
-  if (plan.ok())
+  if (plan.ok()) {
     plan.value().joints_on_leg = [planner](std::size_t leg, double share, const JointVector& near) {
       return planner->joints_on_leg(leg, share, near);
     };
+    plan.value().jet_on_leg = [planner](std::size_t leg, double share, const JointJet& near) {
+      return planner->jet_on_leg(leg, share, near);
+    };
+  }
   return plan;
 }
 

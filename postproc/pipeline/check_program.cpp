@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "kernels/core/units.h"
+#include "postproc/pipeline/clearance_check.h"
 #include "postproc/pipeline/controller_blending.h"
 #include "postproc/pipeline/conversion_parts.h"
 #include "postproc/pipeline/path_match.h"
@@ -16,8 +17,9 @@ namespace {
 /// the control does.
 struct FollowedProgram {
   ReadBack read;
-  double tip_allowance = 0.0;   ///< mm
-  double axis_allowance = 0.0;  ///< rad
+  double tip_allowance = 0.0;        ///< mm
+  double axis_allowance = 0.0;       ///< rad
+  double clearance_allowance = 0.0;  ///< mm (largest_allowance)
 };
 
 /// Over all tool moves, each from where the joints stand before it.
@@ -109,7 +111,9 @@ bool follow_program(const CheckInput& in, const ScrewChain& chain, const Dialect
                            largest_turn_allowance(motion.read, chain, dialect.tool_turn);
   // A rounding is paired with the straight way monotonically: its bound adds to the matching's.
   BlendAllowance rounding;
-  for (const BlendAllowance& a : blend_allowances(motion.read, chain, tool_length)) {
+  const auto roundings = blend_allowances(motion.read, chain, tool_length);
+  program.clearance_allowance = largest_allowance(roundings, in.machine, true);
+  for (const BlendAllowance& a : roundings) {
     rounding.tip = std::max(rounding.tip, a.tip);
     rounding.rotation = std::max(rounding.rotation, a.rotation);
   }
@@ -170,12 +174,18 @@ Conversion check_program(const CheckInput& in, const Progress& progress) {
   }
   out.checks.insert(out.checks.end(), machine.checks.begin(), machine.checks.end());
   out.read = std::move(program.read);
+  std::shared_ptr<const TriangleTree> tree;
   if (in.part) {
     const PartCheck part(*in.part, in.machine);
     append(out.diagnostics, part.diagnostics());
     if (part.ok() && !beam_locations(out.read, chain).empty())
       out.checks.push_back(part.output(out.read, chain));
+    tree = part.shared_tree();
   }
+  if (in.collision_check)
+    add_clearance({in.machine, chain, in.part ? &*in.part : nullptr, tree,
+                   program.clearance_allowance, in.file_name},
+                  progress, out);
   watch.lap("verify");
   tell_failed_checks(out, in.file_name);
   if (has_error(out.diagnostics))

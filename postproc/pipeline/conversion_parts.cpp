@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "postproc/pipeline/clearance_check.h"
 #include "postproc/pipeline/planned_limits.h"
+#include "postproc/pipeline/process_check.h"
 #include "postproc/pipeline/registry.h"
 
 namespace smoothpost {
@@ -80,6 +82,10 @@ void describe_promises(const MachineDefinition& machine, bool has_part, Conversi
       "the machine is as its definition file says: axes, pivots and tool are calibrated");
   if (const Dialect* dialect = find_dialect(machine.dialect.name))
     if (machine.dialect.offset_guard) out.assumes.push_back(dialect->guard);
+  if (!machine.power.speed.empty() && !follows_power(machine))
+    out.assumes.push_back(
+        "the control sets the beam's power from the speed of the tip by the table of "
+        "[process.power]: the program commands no power by speed");
   out.not_checked.push_back("clearance");
   out.not_checked.push_back("acceleration_limit");
   out.not_checked.push_back("jerk_limit");
@@ -93,6 +99,31 @@ void describe_promises(const MachineDefinition& machine, bool has_part, Conversi
   if (!assumed.empty())
     out.assumes.push_back(
         "the limits of these axes are assumed, not from a datasheet, and used at 90 %: " + assumed);
+}
+
+void add_clearance(const ClearanceInput& in, const Progress& progress, Conversion& out) {
+  auto built = machine_scene({in.machine, in.chain, in.part, in.tree, in.allowance});
+  append(out.diagnostics, built.diagnostics());
+  if (!built.ok() || !built.value()) return;
+  const Scene& scene = *built.value();
+  const ClearanceReport report = check_clearance(scene, out.read, in.machine, progress);
+  out.checks.push_back(clearance_check(report, scene, out.read));
+  out.retreat_may_free = retreat_may_free(report, scene, in.machine);
+  const auto texts = place_texts(report, scene);
+  for (std::size_t k = 0; k < texts.size(); ++k)
+    out.diagnostics.push_back(
+        diagnostic("CK110", texts[k], in.file_name,
+                   static_cast<int>(out.read.moves[report.places[k].move].line)));
+  std::erase(out.not_checked, "clearance");
+  if (in.part == nullptr) out.not_checked.push_back("part_clearance");
+  out.assumes.push_back(
+      "bodies are where the machine file has them; the tool that cuts is none of them, nor is the "
+      "way from where the machine stands to the first position that the program states whole");
+  if (in.allowance > 0.0)
+    out.assumes.push_back(
+        "what the control rounds moves no body farther than the tip of an arm "
+        "of 1 m: " +
+        std::to_string(in.allowance) + " mm are added to every clearance");
 }
 
 namespace {
@@ -151,13 +182,13 @@ PartCheck::InputRegistration PartCheck::input(const ReferencePath& reference) co
     lines.resize(points.size(), reference.path().points[k].line);
   }
   InputRegistration out;
-  out.registration = register_part(points, tree_.value(), settings_);
+  out.registration = register_part(points, *tree_, settings_);
   out.worst_line = lines[out.registration.gap.worst];
   return out;
 }
 
 Check PartCheck::output(const ReadBack& read, const ScrewChain& chain) const {
-  const GapStatistics gap = measure_gaps(beam_locations(read, chain), tree_.value(), settings_);
+  const GapStatistics gap = measure_gaps(beam_locations(read, chain), *tree_, settings_);
   Check c;
   c.name = "gap";
   c.unit = "mm";

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -46,10 +47,14 @@ RegistrationSettings registration_settings(const MachineDefinition& machine);
 class PartCheck {
  public:
   PartCheck(const TriangleMesh& part, const MachineDefinition& machine)
-      : settings_(registration_settings(machine)), tree_(build_triangle_tree(part)) {}
+      : settings_(registration_settings(machine)) {
+    auto built = build_triangle_tree(part);
+    diagnostics_ = built.diagnostics();
+    if (built.ok()) tree_ = std::make_shared<const TriangleTree>(std::move(built.value()));
+  }
 
-  const Diagnostics& diagnostics() const { return tree_.diagnostics(); }
-  bool ok() const { return tree_.ok(); }
+  const Diagnostics& diagnostics() const { return diagnostics_; }
+  bool ok() const { return tree_ != nullptr; }
 
   /// At every 2 mm of the beam-on path, at most 64 points a segment: a circle is one segment.
   struct InputRegistration {
@@ -60,7 +65,8 @@ class PartCheck {
 
   const RegistrationSettings& settings() const { return settings_; }
   /// @pre ok()
-  const TriangleTree& tree() const { return tree_.value(); }
+  const TriangleTree& tree() const { return *tree_; }
+  const std::shared_ptr<const TriangleTree>& shared_tree() const { return tree_; }
 
   Check output(const ReadBack& read, const ScrewChain& chain) const;
 
@@ -69,7 +75,8 @@ class PartCheck {
   static std::uint32_t line_of(const ReadBack& read, std::size_t k);
 
   RegistrationSettings settings_;
-  Result<TriangleTree> tree_;
+  Diagnostics diagnostics_;
+  std::shared_ptr<const TriangleTree> tree_;
 };
 
 /// Tool moves as seen in the part: where the text states its own frames (BASE, work offset, TOOL)
@@ -85,6 +92,19 @@ Result<ControllerMotion> follow(ReadBack read, const MachineDefinition& machine,
 /// Adds the checks of the accelerations and jerks of out.schedule (planned_limit_checks) and what
 /// they rest on; does nothing without a schedule.
 void add_planned_limits(const MachineDefinition& machine, Conversion& out);
+
+/// Checks the clearance of the program's motion, `out.read`, and takes "clearance" from what is not
+/// checked; does nothing where the machine has no bodies, or with machine.collision off. Failures
+/// are diagnostics CK110, five at most.
+struct ClearanceInput {
+  const MachineDefinition& machine;
+  const ScrewChain& chain;             ///< tool length 0, part placed
+  const TriangleMesh* part = nullptr;  ///< in W
+  std::shared_ptr<const TriangleTree> tree;
+  double allowance = 0.0;  ///< largest_allowance()
+  std::string file_name;   ///< for messages, of the output
+};
+void add_clearance(const ClearanceInput& input, const Progress& progress, Conversion& out);
 
 /// What a certificate takes for granted and does not check, whatever the program.
 void describe_promises(const MachineDefinition& machine, bool has_part, Conversion& out);

@@ -8,11 +8,14 @@
 #include "kernels/core/units.h"
 #include "kernels/optimise/shape_tuning.h"
 #include "postproc/pipeline/arm_plan.h"
+#include "postproc/pipeline/beam_power.h"
+#include "postproc/pipeline/clearance_check.h"
 #include "postproc/pipeline/controller_blending.h"
 #include "postproc/pipeline/conversion_parts.h"
 #include "postproc/pipeline/joint_plan.h"
 #include "postproc/pipeline/laser_plan.h"
 #include "postproc/pipeline/machine_program.h"
+#include "postproc/pipeline/process_check.h"
 #include "postproc/pipeline/recipe_check.h"
 #include "postproc/pipeline/registry.h"
 #include "postproc/pipeline/rewind.h"
@@ -20,6 +23,9 @@
 namespace smoothpost {
 
 namespace {
+
+constexpr double kFirstRetreat = 10.0;  // mm, of a standoff
+constexpr double kLeastStroke = 10.0;   // mm, that is left of it
 
 constexpr int kMostSplitRounds = 30;
 
@@ -89,7 +95,7 @@ class Converter {
         path_(in.input.path),
         cuts_(find_cuts(path_, {in.keep_links, in.machine.links.micro_joint, in.cuts})),
         reference_(path_, in.input.frames),
-        wanted_states_(wanted_states(in)) {}
+        wanted_states_(programmed_states(in.input, in.keep_links, in.machine)) {}
 
   Conversion run() {
     out_.reference = in_.input.reference;
@@ -271,6 +277,11 @@ class Converter {
     settings.tip_tolerance = tolerance.tip * tolerance.budget.chord;
     settings.axis_tolerance = tolerance.axis * tolerance.budget.chord;
     settings.held = home_of(in_.machine);
+    if (const int standoff = standoff_joint(in_.machine); standoff >= 0)
+      settings.held[standoff] =
+          std::clamp(settings.held[standoff] - towards_wrist(in_.machine) * in_.standoff_retreat,
+                     in_.machine.axes[static_cast<std::size_t>(standoff)].joint.lower,
+                     in_.machine.axes[static_cast<std::size_t>(standoff)].joint.upper);
     settings.file_name = in_.input_name;
     for (const auto& axis : in_.machine.axes) settings.axis_names.push_back(axis.name);
     settings.may_split = in_.machine.links.rewind_in_cut;
@@ -299,6 +310,8 @@ class Converter {
                       planned.value().samples);
     program_ = std::move(built.program);
     plan_blending(program_, in_.machine, chain_);
+    if (follows_power(in_.machine))
+      power_ = follow_power(program_, reference_, out_.schedule, in_.machine);
     if (!built.cramped.empty()) {
       out_.diagnostics.push_back(diagnostic(
           "LK104",
@@ -540,52 +553,20 @@ class Converter {
     if (part_ && part_->ok()) out_.checks.push_back(part_->output(out_.read, chain_));
     out_.checks.insert(out_.checks.end(), machine.checks.begin(), machine.checks.end());
     out_.axes = std::move(machine.axes);
+    if (in_.collision_check)
+      add_clearance(
+          {in_.machine, chain_, in_.part ? &*in_.part : nullptr,
+           part_ && part_->ok() ? part_->shared_tree() : nullptr,
+           largest_allowance(with.rounding, in_.machine, turn_ != ToolTurn::none), "output"},
+          progress_, out_);
     add_planned_limits(in_.machine, out_);
     out_.scheduled_time = machine.scheduled_time;
-    out_.checks.push_back(process_check(motion.read));
+    if (power_) out_.checks.push_back(power_check(*power_, in_.machine));
+    out_.checks.push_back(
+        process_check(motion.read, out_.line_map, cuts_, wanted_states_, in_.machine));
     for (Check& c : out_.checks) give_input_line(c);
     watch_.lap("verify");
     return true;
-  }
-
-  // Spindle, coolant, gas ... at the start of every cut, from the text, against the whole input.
-  Check process_check(const ReadBack& read) const {
-    Check c;
-    c.name = "process_as_programmed";
-    c.unit = "cuts";
-    std::map<std::string, std::string> states;
-    std::size_t event = 0;
-    auto cut = cuts_.begin();
-    for (std::size_t i = 0; i < read.moves.size() && i < out_.line_map.size(); ++i) {
-      for (; event < read.events.size() && read.events[event].before <= i; ++event)
-        note_state(read.events[event].name, states);
-      if (out_.line_map[i].role != MoveRole::path) continue;
-      while (cut != cuts_.end() && (cut->omitted || cut->last < out_.line_map[i].segment)) ++cut;
-      if (cut == cuts_.end()) break;
-      if (out_.line_map[i].segment < cut->first) continue;
-      if (!cut->after_rewind && states != wanted_states_[static_cast<std::size_t>(cut->number)]) {
-        c.value += 1.0;
-        if (c.output_line == 0) c.output_line = read.moves[i].line;
-      }
-      ++cut;
-    }
-    c.ok = c.value == 0.0;
-    if (!c.ok)
-      c.note = "spindle, coolant, gas or power are not as the input has them when this cut starts";
-    return c;
-  }
-
-  // By cut number; only what the machine has words for.
-  static std::vector<std::map<std::string, std::string>> wanted_states(const ConvertInput& in) {
-    ToolPath whole = in.input.path;
-    const auto cuts = find_cuts(whole, {in.keep_links, in.machine.links.micro_joint, {}});
-    std::vector<std::map<std::string, std::string>> wanted(cuts.size() + 1);
-    for (const Cut& cut : cuts) {
-      auto& states = wanted[static_cast<std::size_t>(cut.number)];
-      states = states_at(in.input.path.events, cut.first - 1);
-      std::erase_if(states, [&in](const auto& s) { return !in.machine.has_event(s.second); });
-    }
-    return wanted;
   }
 
   void give_input_line(Check& check) const {
@@ -650,11 +631,12 @@ class Converter {
   ReferencePath reference_;
   ScrewChain chain_;
   MachineProgram program_;
-  std::vector<std::map<std::string, std::string>> wanted_states_;
+  std::vector<ProcessStates> wanted_states_;
   std::vector<std::uint32_t> split_lines_;
   std::optional<SmoothedPath> smoothed_;
   std::optional<TuningResult> tuned_;
   std::vector<LaserPlanPath> laser_paths_;
+  std::optional<PowerFollowing> power_;
   std::optional<PartCheck> part_;
   std::optional<Inverse> inverse_;
   const Dialect* dialect_ = nullptr;
@@ -664,7 +646,31 @@ class Converter {
 }  // namespace
 
 Conversion convert(const ConvertInput& in, bool force, const Progress& progress) {
-  return Converter(in, force, progress).run();
+  Conversion first = Converter(in, false, progress).run();
+  if (first.retreat_may_free) {
+    const JointLimits limits = limits_of(in.machine);
+    const int standoff = standoff_joint(in.machine);
+    const double room = limits.upper[standoff] - limits.lower[standoff] -
+                        2.0 * in.machine.standoff.reserve - kLeastStroke;
+    ConvertInput longer = in;
+    double retreat = 0.0;
+    while (retreat < room) {
+      retreat = std::min(std::max(kFirstRetreat, 1.5 * retreat + 5.0), room);
+      longer.standoff_retreat = retreat;
+      Conversion next = Converter(longer, false, progress).run();
+      if (next.verdict == Verdict::certified) {
+        next.diagnostics.push_back(
+            diagnostic("KN157",
+                       "the standoff was made " + std::to_string(std::lround(retreat)) +
+                           " mm longer than it would be, so that the head keeps its clearance",
+                       in.input_name));
+        next.diagnostics.back().severity = Severity::note;
+        return next;
+      }
+    }
+  }
+  return force && first.verdict != Verdict::certified ? Converter(in, true, progress).run()
+                                                      : std::move(first);
 }
 
 }  // namespace smoothpost

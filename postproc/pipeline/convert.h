@@ -31,6 +31,8 @@ struct ConvertInput {
   bool keep_links = false;         ///< --links keep: rapids stay as the input has them
   std::optional<CutRange> cuts;    ///< --cuts: the others are left out
   bool timed = false;              ///< make Conversion::timeline
+  bool collision_check = true;     ///< false: --no-collision-check
+  double standoff_retreat = 0.0;   ///< mm, of convert() itself: LaserPlanInput::retreat
 };
 
 enum class Verdict { certified, limits_only, refused, forced };
@@ -76,6 +78,7 @@ struct Conversion {
   Timeline timeline;  ///< empty unless ConvertInput::timed
   std::uint32_t merged_points = 0;
   std::size_t links = 0;
+  bool retreat_may_free = false;  ///< the clearance fails where a longer standoff may help
   std::size_t blocks = 0;
   std::vector<StageTime> stages;
 
@@ -85,6 +88,10 @@ struct Conversion {
 /// read -> registration -> kinematics -> emission -> read back -> certificate.
 /// The program is made when it can be made, also when a check fails (the verdict says so); the
 /// caller writes it only when it is certified or forced.
+/// Where only the head before a standoff axis is too near to the part, the conversion is made again
+/// with ever longer standoffs (10 mm, then each 1.5 times the one before and 5 mm more, at last all
+/// but 10 mm of the stroke) until its clearance holds; the first one that is certified is the answer,
+/// told by KN157, else the conversion as it was.
 Conversion convert(const ConvertInput& in, bool force, const Progress& progress);
 
 struct CheckInput {
@@ -96,6 +103,7 @@ struct CheckInput {
   std::string part_name;
   double tool_length = 0.0;                 ///< mm, for programs that leave it to the control
   std::optional<InterpretedInput> against;  ///< the input that the program is to follow
+  bool collision_check = true;              ///< false: --no-collision-check
 };
 
 /// Certifies an existing machine program against its machine: verdict limits_only; with `against`

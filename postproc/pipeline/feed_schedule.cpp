@@ -399,6 +399,11 @@ ScheduledStretch::Motion ScheduledStretch::at(double t) const {
   return m;
 }
 
+double ScheduledStretch::tip_speed(double t) const {
+  const FeedState state = profile.at(t / slowing);
+  return state.first / slowing * joints.jet(joints.piece_at(state.s), state.s).tip_first;
+}
+
 const char* word(FeedWitness::Kind limit) {
   switch (limit) {
     case FeedWitness::Kind::velocity:

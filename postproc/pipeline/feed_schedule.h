@@ -25,6 +25,8 @@ struct ScheduledStretch {
     JointVector position, velocity, acceleration, jerk;
   };
   Motion at(double t) const;
+  /// Of the tip, mm/s, at time t.
+  double tip_speed(double t) const;
 };
 
 /// A part of the path that is slower than programmed, and the limit that keeps it so.

@@ -523,6 +523,22 @@ Result<InterpretedInput> interpret_nc(std::string text, const InputSettings& set
   return Result<InterpretedInput>(std::move(built.value()), std::move(diagnostics));
 }
 
+Result<InterpretedInput> interpret_cl(std::string text, const InputSettings& settings) {
+  cl::ReaderSettings reader = settings.cl;
+  if (settings.machine) reader.process = settings.machine->process;
+  if (settings.process) reader.process = *settings.process;
+  Recorder recorder;
+  const auto summary = cl::read(text, settings.file_name, reader, recorder);
+  if (!summary.ok()) return Result<InterpretedInput>::failure(summary.diagnostics());
+  Diagnostics diagnostics = summary.diagnostics();
+  auto built = PathBuilder(recorder, settings).run();
+  diagnostics.insert(diagnostics.end(), built.diagnostics().begin(), built.diagnostics().end());
+  if (!built.ok()) return Result<InterpretedInput>::failure(std::move(diagnostics));
+  built.value().lines = summary.value().lines;
+  for (const auto& assumed : summary.value().assumes) built.value().assumes.push_back(assumed);
+  return Result<InterpretedInput>(std::move(built.value()), std::move(diagnostics));
+}
+
 Result<InterpretedInput> interpret_csv(std::string text, const InputSettings& settings) {
   const std::size_t lines = static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
   auto read = read_cutter_locations(text, settings.file_name);

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "formats/cl/reader.h"
 #include "formats/nc/interpreter.h"
 #include "kernels/core/result.h"
 #include "postproc/pipeline/reference_path.h"
@@ -23,6 +24,7 @@ struct InputSettings {
   std::optional<nc::InputDialect> dialect;  ///< nothing: found out when only one fits the text
   /// fanuc, haas: mm or deg that one unit of a number without point is; nothing: refused
   std::optional<double> integer_unit;
+  cl::ReaderSettings cl;  ///< of CL data; its process table is taken from the members above
 };
 
 /// The name of --input-dialect, and the dialect of that name.
@@ -49,6 +51,10 @@ struct InterpretedInput {
 ///    takes over).
 ///  - W is the program's coordinate system at its first motion.
 Result<InterpretedInput> interpret_nc(std::string text, const InputSettings& settings);
+
+/// Reads CL data (APT, NX CLSF): tip and tool axis in the part, the way to the first position and
+/// events as for NC text. W is the frame of the coordinates.
+Result<InterpretedInput> interpret_cl(std::string text, const InputSettings& settings);
 
 /// Reads CSV cutter locations.
 Result<InterpretedInput> interpret_csv(std::string text, const InputSettings& settings);

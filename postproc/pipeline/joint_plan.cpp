@@ -82,6 +82,31 @@ class Planner {
     return there.q;
   }
 
+  std::optional<JointJet> jet_on_leg(std::size_t leg, double share, const JointJet& near) const {
+    const std::optional<PoseJet> pose = path_.jet(leg, share);
+    if (!pose) return {};
+    JointSample there;
+    there.segment = static_cast<std::uint32_t>(leg);
+    there.s = share;
+    if (!place(there, near.col(0), 1.0)) return {};
+    JointJet q = JointJet::Zero(near.rows(), 4);
+    q.col(0) = there.q;
+    FreeJoints free{};
+    for (std::size_t j = 0; j < pair_.chain().joints.size(); ++j)
+      free[j] = !pair_.chain().joints[j].redundant;
+    LocationJet target{pose->tip, VectorJet::Zero()};
+    for (std::size_t r = 0; r < 4; ++r)
+      target.axis.col(static_cast<Eigen::Index>(r)) = pose->rotation[r].col(2);
+    if (in_cap(target.axis.col(0))) {
+      target.axis = constant_jet(target.axis.col(0).dot(pole_) > 0.0 ? pole_ : Vec3(-pole_));
+      const int first = pair_.first_rotary();
+      free[static_cast<std::size_t>(first)] = false;
+      q(first, 1) = near(first, 1);
+    }
+    target.tip += path_.point(leg).tool_length * target.axis;
+    return joint_jet(pair_.chain(), q, free, target);
+  }
+
  private:
   bool replanned(std::size_t segment) const {
     return segment > 0 && path_.point(segment).replanned;
@@ -337,10 +362,14 @@ Result<JointPlan> plan_joints(const SmoothedPath& path, const RotaryPair& pair,
                               const JointPlanSettings& settings, const Progress& progress) {
   const auto planner = std::make_shared<Planner>(path, pair, settings, progress);
   Result<JointPlan> plan = planner->run();
-  if (plan.ok())
+  if (plan.ok()) {
     plan.value().joints_on_leg = [planner](std::size_t leg, double share, const JointVector& near) {
       return planner->joints_on_leg(leg, share, near);
     };
+    plan.value().jet_on_leg = [planner](std::size_t leg, double share, const JointJet& near) {
+      return planner->jet_on_leg(leg, share, near);
+    };
+  }
   return plan;
 }
 

@@ -9,6 +9,7 @@
 
 #include "kernels/core/progress.h"
 #include "kernels/core/result.h"
+#include "kernels/kinematics/joint_jet.h"
 #include "kernels/kinematics/rotary_pair.h"
 #include "postproc/pipeline/smoothed_path.h"
 
@@ -47,6 +48,12 @@ struct JointSample {
 /// solutions the one nearest to `near`; nothing where the pose cannot be reached.
 using JointsOnLeg = std::function<std::optional<JointVector>(std::size_t leg, double share,
                                                              const JointVector& near)>;
+
+/// The same with the derivatives by the share, where the leg has them (SmoothedPath::jet) and the
+/// joints follow from the tool alone. `near`: column 0 as above, column 1 the rate of joints that
+/// do not follow from the tool (the first rotary while the tool axis stands on its pole).
+using JointJetOnLeg =
+    std::function<std::optional<JointJet>(std::size_t leg, double share, const JointJet& near)>;
 
 /// A place inside a cut that has no continuous way on: the cut has to be split there.
 using SplitPlace = PathPlace;
@@ -88,7 +95,8 @@ struct SingularPlace {
 struct JointPlan {
   std::vector<JointSample> samples;
   JointsOnLeg
-      joints_on_leg;  ///< the path, SmoothedPath and chain of the planner have to outlive it
+      joints_on_leg;         ///< the path, SmoothedPath and chain of the planner have to outlive it
+  JointJetOnLeg jet_on_leg;  ///< likewise
   std::optional<SpinGain> spin_gain;
   std::vector<SingularPlace> singular;  ///< arms: the nearest of each stretch of one kind
   std::vector<SplitPlace> splits;       ///< not empty: no samples; split there and plan again

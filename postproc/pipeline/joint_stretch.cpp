@@ -13,10 +13,13 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPerRadian = 50.0;                               // mm of s
 constexpr double kNoWay = 1e-9;                                   // mm
+constexpr double kNoExtent = 1e-12;                               // mm, of s
 constexpr double kSlowestRotaryFeed = 30.0 * kRadiansPerDegree;   // rad/s, turning without a feed
 constexpr double kVelocityJump = 1e-6, kAccelerationJump = 1e-3;  // of the limits
 constexpr double kSliver = 0.005;                                 // of both neighbours
-constexpr double kSamePlace = 1e-6;                               // mm or rad, sample and function
+constexpr double kJerkError = 1e-4;                               // of a joint's jerk
+constexpr double kFastest = 500.0;   // mm/s, of s, where no feed is programmed
+constexpr double kSamePlace = 1e-6;  // mm or rad, sample and function
 
 /// Builds the stretches of one plan.
 class StretchBuilder {
@@ -129,7 +132,7 @@ class StretchBuilder {
     const std::size_t leg = samples_[first].leg;
     const double extent = extent_of(leg);
     const double start = now_.length();
-    if (extent <= 0.0) {
+    if (extent <= kNoExtent || !(start + extent > start)) {
       // Nothing moves: a block that stands still, whatever its time.
       finish(first - 1, StopCause::corner);
       return begin_at(last);
@@ -170,12 +173,24 @@ class StretchBuilder {
   // Share of the leg at which sample i stands; that of the one before the leg is 0.
   double share_of(std::size_t i) const { return i < leg_first_ ? 0.0 : samples_[i].leg_share; }
 
-  JointVector near(double share) const {
+  std::size_t sample_behind(double share) const {
     std::size_t i = leg_first_;
     while (i < leg_last_ && samples_[i].leg_share < share) ++i;
+    return i;
+  }
+
+  JointVector near(double share) const {
+    const std::size_t i = sample_behind(share);
     const double from = share_of(i - 1), to = share_of(i);
     const double t = to > from ? std::clamp((share - from) / (to - from), 0.0, 1.0) : 1.0;
     return samples_[i - 1].q + t * (samples_[i].q - samples_[i - 1].q);
+  }
+
+  JointVector near_rate(double share) const {
+    const std::size_t i = sample_behind(share);
+    const double part = share_of(i) - share_of(i - 1);
+    if (!(part > 0.0)) return JointVector::Zero(in_.machine.size());
+    return (samples_[i].q - samples_[i - 1].q) / part;
   }
 
   // Joints and tip at a share of the leg. Out of reach: the straight way, which is found out as no
@@ -199,8 +214,8 @@ class StretchBuilder {
     return (value.head(in_.machine.size()) - samples_[sample].q).cwiseAbs().maxCoeff() < kSamePlace;
   }
 
-  // Two windows that end at nearly the same place leave a piece too short for third derivatives of
-  // rounded values; both sides are C³ there, so that one formula stands for the other.
+  // Two windows that end at nearly the same place leave a piece that is too short for an element
+  // of the schedule, or for third derivatives of rounded values. Both sides are C³ there.
   static std::vector<double> without_slivers(std::vector<double> breaks) {
     for (std::size_t i = 1; i + 2 < breaks.size();) {
       const double before = breaks[i] - breaks[i - 1], gap = breaks[i + 1] - breaks[i];
@@ -213,23 +228,74 @@ class StretchBuilder {
     return breaks;
   }
 
+  // Joints and tip with their derivatives by s, `extent` mm of which are the leg.
+  std::optional<ChebyshevJet> jet_at(std::size_t leg, double share, double extent) const {
+    const int n = in_.machine.size();
+    JointJet guess = JointJet::Zero(n, 4);
+    guess.col(0) = near(share);
+    guess.col(1) = near_rate(share);
+    const auto joints = in_.plan.jet_on_leg(leg, share, guess);
+    if (!joints) return {};
+    const auto tool = in_.path.jet(leg, share);
+    ChebyshevJet jet;
+    double scale = 1.0;
+    for (std::size_t r = 0; r < 4; ++r, scale /= extent) {
+      const auto order = static_cast<Eigen::Index>(r);
+      jet[r].resize(n + 3);
+      jet[r].head(n) = scale * joints->col(order);
+      jet[r].tail<3>() = scale * tool->tip.col(order);
+    }
+    return jet;
+  }
+
+  // What third derivatives may be off: kJerkError of the joint's jerk at the programmed feed.
+  PathValue third_tolerance() const {
+    const int n = in_.machine.size();
+    const PathPoint& point = path_.points[samples_[leg_last_].segment];
+    const double way = in_.path.reference().length(samples_[leg_last_].segment);
+    const double feed = point.duration > 0.0 && way > kNoWay ? way / point.duration : kFastest;
+    PathValue third(n + 3);
+    double least = kInfinity;
+    for (int j = 0; j < n; ++j) {
+      const AxisDefinition& axis = in_.machine.axes[static_cast<std::size_t>(j)];
+      third[j] = kJerkError * axis.jerk / (feed * feed * feed);
+      if (axis.joint.kind == JointKind::linear) least = std::min(least, third[j]);
+    }
+    third.tail<3>().setConstant(least < kInfinity ? least : kPerRadian * third.head(n).minCoeff());
+    return third;
+  }
+
   // The whole leg by the planner's function; false and nothing added if that is not smooth.
   bool add_whole_leg(std::size_t leg, double extent, double start) {
     if (by_joints() || !in_.plan.joints_on_leg) return false;
     for (std::size_t i = leg_first_; i <= leg_last_; ++i)
       if (!same_place(at(leg, share_of(i)), i)) return false;
     if (!same_place(at(leg, 0.0), leg_first_ - 1)) return false;
-    const std::vector<double> shares = without_slivers(in_.path.breaks(leg));
+    const std::vector<double> breaks = in_.path.breaks(leg);
+    const std::vector<double> shares = without_slivers(breaks);
     const std::size_t before = now_.pieces();
     const std::size_t sub_before = now_.path.pieces();
-    for (std::size_t b = 1; b < shares.size(); ++b) {
-      const double from = start + shares[b - 1] * extent, to = start + shares[b] * extent;
-      if (!(to > from)) continue;
-      if (!append([&](double s) { return at(leg, std::clamp((s - start) / extent, 0.0, 1.0)); },
-                  from, to)) {
-        drop_pieces(before, sub_before);
-        return false;
+    const auto place = [&](double share) { return start + share * extent; };
+    const auto share_at = [&](double s) { return std::clamp((s - start) / extent, 0.0, 1.0); };
+    bool exact = in_.plan.jet_on_leg && jet_at(leg, 0.5, extent).has_value();
+    for (std::size_t b = 1, part = 1; b < shares.size(); ++b) {
+      if (!(place(shares[b]) > place(shares[b - 1]))) continue;
+      const std::size_t sub = now_.path.pieces();
+      // Slivers belong to a piece of the schedule, but have formulas of their own.
+      for (; exact && part < breaks.size() && breaks[part] <= shares[b]; ++part)
+        if (place(breaks[part]) > place(breaks[part - 1]))
+          exact = now_.path.append_jets([&](double s) { return jet_at(leg, share_at(s), extent); },
+                                        place(breaks[part - 1]), place(breaks[part]),
+                                        third_tolerance(), {});
+      if (!exact) {
+        now_.path.shorten(sub);
+        if (!now_.path.append([&](double s) { return at(leg, share_at(s)); }, place(shares[b - 1]),
+                              place(shares[b]), {})) {
+          drop_pieces(before, sub_before);
+          return false;
+        }
       }
+      end_piece(place(shares[b]));
       add_piece_data(leg_last_, rate_of(leg, extent));
     }
     stop_if_rough(before, sub_before, leg_first_ - 1);
@@ -239,11 +305,9 @@ class StretchBuilder {
     return true;
   }
 
-  bool append(const ChebyshevPath::Function& f, double from, double to) {
-    if (!now_.path.append(f, from, to, {})) return false;
+  void end_piece(double at) {
     now_.sub_end.push_back(static_cast<std::uint32_t>(now_.path.pieces()));
-    now_.breaks.push_back(to);
-    return true;
+    now_.breaks.push_back(at);
   }
 
   void drop_pieces(std::size_t pieces, std::size_t sub_pieces) {
@@ -268,14 +332,15 @@ class StretchBuilder {
     const Vec3 from_tip = in_.path.at(leg, share_of(i - 1)).tip;
     const Vec3 to_tip = in_.path.at(leg, share_of(i)).tip;
     if (way > 0.0) {
-      append(
+      now_.path.append(
           [&](double s) {
             PathValue v(n + 3);
             v.head(n) = samples_[i - 1].q + s / way * (samples_[i].q - samples_[i - 1].q);
             v.tail<3>() = from_tip + s / way * (to_tip - from_tip);
             return v;
           },
-          0.0, way);
+          0.0, way, {});
+      end_piece(way);
       add_piece_data(i, rate_of(leg, extent));
     }
     now_.sample_s.push_back(way > 0.0 ? way : 0.0);

@@ -5,12 +5,10 @@
 #include "kernels/core/joints.h"
 #include "kernels/core/tool_path.h"
 #include "kernels/kinematics/head_geometry.h"
+#include "kernels/kinematics/joint_jet.h"
 #include "kernels/spline/bspline_basis.h"
 
 namespace smoothpost {
-
-/// Joint values and their derivatives of orders 1 … 3 by one parameter: row j is joint j.
-using JointJet = Eigen::Matrix<double, Eigen::Dynamic, 4, Eigen::ColMajor, kMaxJoints, 4>;
 
 /// The joints along one stretch of a laser's cut, as a function of one parameter u: splines for
 /// tip, rotaries and standoff, and the linear axes that follow from them. C⁴ between first() and

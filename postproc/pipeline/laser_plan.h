@@ -69,6 +69,7 @@ struct LaserPlanInput {
   const RotaryPair& pair;              ///< of the output chain: tool length 0, part placed
   const TriangleTree* part = nullptr;  ///< in W; nullptr: none
   std::string file_name;               ///< for messages
+  double retreat = 0.0;  ///< mm by which the standoff's range is shorter at the wrist's end
 };
 
 /// The joints of a laser's cuts, stretch by stretch (stretches_of): the tip smoothed inside the

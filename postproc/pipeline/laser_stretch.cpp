@@ -6,6 +6,7 @@
 
 #include "kernels/core/units.h"
 #include "kernels/kinematics/inverse.h"
+#include "postproc/pipeline/clearance_check.h"
 #include "postproc/pipeline/conversion_parts.h"
 #include "postproc/pipeline/laser_samples.h"
 #include "postproc/pipeline/orientation_check.h"
@@ -377,6 +378,10 @@ StandoffOptions StretchPlanner::standoff_options(double rate) const {
       machine_.standoff.following == Following::none ? 0.0 : machine_.standoff.reserve;
   o.lower = axis.joint.lower + reserve;
   o.upper = axis.joint.upper - reserve;
+  if (towards_wrist(machine_) > 0)
+    o.upper -= in_.laser.retreat;
+  else
+    o.lower += in_.laser.retreat;
   o.standoff = limits_by_parameter(axis, share, rate);
   for (std::size_t i = 0; i < 3; ++i)
     o.linear[i] =

@@ -24,6 +24,10 @@ struct Options {
   std::string input_format;
   std::string input_dialect;
   std::string integer_unit;  ///< fanuc, haas: 1 | 0.001, mm or deg of a number without point
+  std::string input_unit;    ///< cl: mm | inch, of lengths before UNITS
+  std::string input_feed;    ///< cl: mm/min, of feed motions before FEDRAT
+  std::string cl_frames;     ///< cl: one | reported | applied
+  std::string cl_circles;    ///< cl: tangents | cw | ccw, CIRCLE of the NX form about its axis
   std::string input_machine;
   std::string process;
   std::vector<std::string> work_offset;        ///< G54=x,y,z[,a,b,c] | auto: on the output machine

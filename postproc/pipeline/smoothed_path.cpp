@@ -32,6 +32,22 @@ Vec3 rotation_vector(const Eigen::Quaterniond& from, const Eigen::Quaterniond& t
   return angle * turn.axis();
 }
 
+// The matrix of a unit quaternion is quadratic in it: the same form with two factors.
+Mat3 rotation_form(const Eigen::Vector4d& p, const Eigen::Vector4d& q) {
+  const Vec3 a = p.tail<3>(), b = q.tail<3>();
+  return (p[0] * q[0] - a.dot(b)) * Mat3::Identity() + a * b.transpose() + b * a.transpose() +
+         cross_matrix(Vec3(p[0] * b + q[0] * a));
+}
+
+MatrixJet rotation_jet(const std::array<Eigen::Vector4d, 4>& q) {
+  MatrixJet out;
+  for (std::size_t r = 0; r < 4; ++r) {
+    out[r].setZero();
+    for (std::size_t s = 0; s <= r; ++s) out[r] += kLeibniz[r][s] * rotation_form(q[s], q[r - s]);
+  }
+  return out;
+}
+
 }  // namespace
 
 SmoothedPath::SmoothedPath(const ReferencePath& reference) : reference_(reference) {
@@ -358,6 +374,22 @@ Mat3 SmoothedPath::rotation_at(std::size_t leg, double s) const {
   if (leg == 0) return reference_.path().points[0].rotation.toRotationMatrix();
   const PathPlace at = place(leg, s);
   return reference_.rotation_at(at.segment, at.s).toRotationMatrix();
+}
+
+std::optional<PoseJet> SmoothedPath::jet(std::size_t leg, double s) const {
+  const Leg& l = legs_[leg];
+  if (l.run < 0) return {};
+  const CornerPath& run = runs_[static_cast<std::size_t>(l.run)];
+  const double length = run.length(l.index);
+  PoseDerivatives d = run.derivatives(l.index, s * length);
+  double scale = 1.0;
+  PoseJet jet;
+  for (std::size_t r = 0; r < 4; ++r, scale *= length) {
+    jet.tip.col(static_cast<Eigen::Index>(r)) = scale * d.tip[r];
+    d.rotation[r] *= scale;
+  }
+  jet.rotation = rotation_jet(d.rotation);
+  return jet;
 }
 
 PathPlace SmoothedPath::place(std::size_t leg, double s) const {

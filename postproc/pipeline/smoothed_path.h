@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "kernels/kinematics/joint_jet.h"
 #include "kernels/smooth/corner_path.h"
 #include "postproc/pipeline/cuts.h"
 #include "postproc/pipeline/reference_path.h"
@@ -71,6 +73,10 @@ class SmoothedPath {
   CutterLocation at(std::size_t leg, double s) const;
   /// @pre full_pose()
   Mat3 rotation_at(std::size_t leg, double s) const;
+  /// Tip and rotation with their derivatives by s, of the formula that holds at s; the rotation's Z
+  /// is the tool axis, and only that means something unless full_pose(). Nothing on a leg that is
+  /// the input's own.
+  std::optional<PoseJet> jet(std::size_t leg, double s) const;
   PathPlace place(std::size_t leg, double s) const;
   /// Extent of a leg in the parameter σ, mm; 0 for leg 0.
   double length(std::size_t leg) const;

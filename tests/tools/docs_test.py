@@ -17,7 +17,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 FLOORS = ["kernels", "formats", "machines", "postproc"]
-CODE_FAMILIES = "US NC CSV STL MF PR RG KN LK CK IN".split()
+CODE_FAMILIES = "US NC CL CSV STL MF PR RG KN LK CK IN".split()
 CODE = re.compile(r'"((?:%s)\d{3})"' % "|".join(CODE_FAMILIES))
 CODE_ROW = re.compile(r"^(?:%s)\d{3}$" % "|".join(CODE_FAMILIES))
 SKIPPED_FOLDERS = {"build", ".git"}

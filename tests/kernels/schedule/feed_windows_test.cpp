@@ -14,13 +14,33 @@ FeedSettings in_windows() {
   return settings;
 }
 
+/// Windows that were tried and did not become part of the law.
+struct WindowRun {
+  FeedResult result;
+  int failed = 0;
+};
+
+/// Progress is told once at the start, once before each later part, once at the end.
+WindowRun run_in_windows(const test::LimitedPath& given) {
+  int told = 0;
+  const Progress progress{[&](const char*, double) { return ++told > 0; }};
+  WindowRun run;
+  run.result = schedule_feed(given.path, given.limits, {}, {}, in_windows(), progress);
+  run.failed = run.result.windows - (told - 1);
+  return run;
+}
+
 /// Random paths of 3 m in windows: limits kept, joined C2, not much slower than in one piece.
-void check_windows(unsigned from, unsigned to) {
+/// @return failed windows
+int check_windows(unsigned from, unsigned to) {
+  int failed = 0;
   for (unsigned seed = from; seed < to; ++seed) {
     INFO("seed " << seed);
     const test::LimitedPath random = test::random_path(seed, 3000.0);
     const FeedResult whole = from_rest_to_rest(random.path, random.limits);
-    const FeedResult parts = from_rest_to_rest(random.path, random.limits, in_windows());
+    const WindowRun run = run_in_windows(random);
+    const FeedResult& parts = run.result;
+    failed += run.failed;
     REQUIRE(whole.status == FeedStatus::solved);
     REQUIRE(parts.status == FeedStatus::solved);
     CHECK(parts.windows >= 3);  // or the path was not cut at all
@@ -29,16 +49,19 @@ void check_windows(unsigned from, unsigned to) {
     CHECK(parts.profile.duration() <= 1.003 * whole.profile.duration());
     CHECK(parts.profile.duration() >= 0.999 * whole.profile.duration());
   }
+  return failed;
 }
 
 }  // namespace
 
 TEST_CASE("schedule_feed: windows lose at most 0.3 per cent", "[kernels][schedule]") {
-  check_windows(3000, 3003);
+  CHECK(check_windows(3000, 3003) == 0);
 }
 
 TEST_CASE("schedule_feed: windows on 17 more paths", "[kernels][schedule][.slow][slow]") {
-  check_windows(3003, 3020);
+  // Of the windows from a moving start on seeds 3004 and 3006, one each has no solution on its
+  // first, coarse grid; the law goes on from a later place of the window before.
+  CHECK(check_windows(3003, 3020) <= 2);
 }
 
 TEST_CASE("schedule_feed: speed and acceleration have no step between windows",

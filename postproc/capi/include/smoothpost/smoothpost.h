@@ -108,6 +108,10 @@ typedef struct smoothpost_options {
   const char* integer_unit; /* fanuc, haas: what one unit of a number without point is: 1 | 0.001 */
   const char* box;  /* place: x0,y0,z0,x1,y1,z1: where the program's zero may lie, mm */
   const char* turn; /* place: largest turn about the vertical, deg */
+  const char* input_unit; /* cl: mm | inch, of lengths before UNITS */
+  const char* input_feed; /* cl: mm/min, of feed motions before FEDRAT */
+  const char* cl_frames;  /* cl: one | reported | applied */
+  const char* cl_circles; /* cl: tangents | cw | ccw */
 } smoothpost_options;
 
 /* All members to "not given". `size` is sizeof(smoothpost_options) as the caller knows it. */

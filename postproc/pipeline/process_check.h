@@ -1,0 +1,34 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "kernels/core/check.h"
+#include "postproc/pipeline/beam_power.h"
+#include "postproc/pipeline/cuts.h"
+#include "postproc/pipeline/interpret.h"
+#include "postproc/pipeline/line_map.h"
+
+// What the process does in the output: spindle, coolant, gas, power.
+namespace smoothpost {
+
+/// States by group (state_group), with the event that each was set by.
+using ProcessStates = std::map<std::string, std::string>;
+
+/// The states in which the input starts each of its cuts, by cut number; only what the machine has
+/// words for, and not the power where the program commands it by speed.
+std::vector<ProcessStates> programmed_states(const InterpretedInput& input, bool keep_links,
+                                             const MachineDefinition& machine);
+
+/// Check process_as_programmed: the states at the start of every cut, from the text, are `wanted`.
+Check process_check(const ReadBack& read, const LineMap& map, const std::vector<Cut>& cuts,
+                    const std::vector<ProcessStates>& wanted, const MachineDefinition& machine);
+
+/// True when the program itself commands the beam's power by speed (follow_power).
+bool follows_power(const MachineDefinition& machine);
+
+/// Check power_follows_speed, as planned.
+Check power_check(const PowerFollowing& power, const MachineDefinition& machine);
+
+}  // namespace smoothpost
