@@ -75,7 +75,7 @@ inline constexpr double kTouching = 1e-6;
 struct PairMargin {
   /// mm: the margin, distance − clearance (see ExemptSphere), is proven to be at least this.
   double lower = 0.0;
-  /// Margin of the witness: the margin is at most this. upper − lower ≤ 2e-6 mm, with an exempt
+  /// Margin of the witness: the margin is at most this. upper − lower ≤ 1e-5 mm, with an exempt
   /// sphere ≤ max(2e-3 mm, 5 % of it). Where no margin below the asked one was found, both are
   /// that.
   double upper = 0.0;

@@ -178,7 +178,8 @@ TEST_CASE("mesh_search: an exempt ball that holds everything, and one that holds
   MarginQuery query{.clearance = 3.0, .exempt = ExemptBall{{0, 0, 2}, 100.0}, .want = 1000.0};
   const auto all = mesh_margin(*shape.tree, ball, Pose::Identity(), query);
   // The farthest corner is the nearest to the ball's surface: 100 − √11.
-  CHECK(all.upper == Approx(100.0 - std::sqrt(11.0)));
+  CHECK(all.upper >= 100.0 - std::sqrt(11.0) - 1e-9);
+  CHECK(all.lower <= 100.0 - std::sqrt(11.0) + 1e-9);
   CHECK(all.lower <= all.upper);
   CHECK(all.upper - all.lower <= exempt_tolerance(all.upper));
   query.exempt = ExemptBall{{0, 0, 2}, 0.9};

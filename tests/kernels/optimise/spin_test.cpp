@@ -243,7 +243,7 @@ TEST_CASE("spin: derivatives of the profile are those of its values", "[kernels]
     const Jet jet = profile.jet(x), before = profile.jet(x - h), after = profile.jet(x + h);
     CHECK(jet[0] == profile.at(x));
     for (std::size_t r = 0; r < 3; ++r)  // the next derivative changes by its own at most
-      CHECK(jet[r + 1] == Approx((after[r] - before[r]) / (2.0 * h)).margin(2e-7));
+      CHECK(jet[r + 1] == Approx((after[r] - before[r]) / (2.0 * h)).epsilon(1e-3).margin(2e-7));
   }
   CHECK(profile.jet(-1.0)[1] == 0.0);
   CHECK(profile.jet(400.0)[1] == 0.0);
