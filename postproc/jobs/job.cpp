@@ -475,9 +475,9 @@ class Run {
     if (conversion.blocks > 0)
       text += "; " + std::to_string(conversion.blocks) + " blocks, " +
               decimal(conversion.scheduled_time, 1) + " s planned";
-    text += "; not checked:";
-    for (const auto& name : conversion.not_checked) text += " " + name + ",";
-    text.pop_back();
+    const auto& unsaid = conversion.not_checked;
+    for (std::size_t i = 0; i < unsaid.size(); ++i)
+      text += (i == 0 ? "; not checked: " : ", ") + unsaid[i];
     result_.summary = text;
   }
 

@@ -277,11 +277,14 @@ class Converter {
     settings.tip_tolerance = tolerance.tip * tolerance.budget.chord;
     settings.axis_tolerance = tolerance.axis * tolerance.budget.chord;
     settings.held = home_of(in_.machine);
-    if (const int standoff = standoff_joint(in_.machine); standoff >= 0)
-      settings.held[standoff] =
-          std::clamp(settings.held[standoff] - towards_wrist(in_.machine) * in_.standoff_retreat,
-                     in_.machine.axes[static_cast<std::size_t>(standoff)].joint.lower,
-                     in_.machine.axes[static_cast<std::size_t>(standoff)].joint.upper);
+    if (const int standoff = standoff_joint(in_.machine); standoff >= 0) {
+      const ChainJoint& joint = in_.machine.axes[static_cast<std::size_t>(standoff)].joint;
+      const double reserve = in_.machine.standoff.reserve;
+      if (in_.standoff_retreat > 0.0)
+        settings.held[standoff] =
+            std::clamp(settings.held[standoff] - towards_wrist(in_.machine) * in_.standoff_retreat,
+                       joint.lower + reserve, joint.upper - reserve);
+    }
     settings.file_name = in_.input_name;
     for (const auto& axis : in_.machine.axes) settings.axis_names.push_back(axis.name);
     settings.may_split = in_.machine.links.rewind_in_cut;
@@ -388,9 +391,13 @@ class Converter {
 
   Result<JointPlan> optimised(JointPlan base, const RotaryPair& pair) {
     watch_.lap("kinematics");
-    LaserPlanInput laser{
-        reference_,    cuts_, in_.machine, pair, part_ && part_->ok() ? &part_->tree() : nullptr,
-        in_.input_name};
+    LaserPlanInput laser{reference_,
+                         cuts_,
+                         in_.machine,
+                         pair,
+                         part_ && part_->ok() ? &part_->tree() : nullptr,
+                         in_.input_name,
+                         in_.standoff_retreat};
     auto result = plan_laser(laser, base, progress_);
     watch_.lap("optimise");
     if (!result.ok()) return Result<JointPlan>::failure(result.diagnostics());

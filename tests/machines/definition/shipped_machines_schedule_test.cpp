@@ -329,14 +329,17 @@ TEST_CASE("shipped machines: random joint paths keep every limit", "[machines][s
 
 TEST_CASE("shipped machines: 1000 random joint paths each keep every limit",
           "[machines][schedule][.slow][slow]") {
-  for (const Machine& machine : shipped()) {
-    const Tally tally = check_paths(machine, 0, 1000);
-    WARN(machine.name << ": " << tally.paths << " paths, " << tally.motion << " s of motion, "
-                      << tally.constant << " by b = const, most of a limit " << tally.most_used
-                      << ", looser limits " << tally.most_looser << ", dilation "
-                      << tally.dilation);
-    CHECK(tally.constant == 0);
-  }
+  for (const Machine& machine : shipped()) SECTION(machine.name) {
+      const Tally tally = check_paths(machine, 0, 1000);
+      WARN(machine.name << ": " << tally.motion << " s of motion, most of a limit "
+                        << tally.most_used << ", dilation " << tally.dilation
+                        << ", time with looser limits " << tally.most_looser << ", on "
+                        << tally.slower << " paths over 1.001");
+      CHECK(tally.constant == 0);
+      // Other limits, other elements: up to three paths of 1000 lose 0.1 to 0.3 % by that.
+      CHECK(tally.most_looser <= 1.003);
+      CHECK(tally.slower <= 3);
+    }
 }
 
 }  // namespace smoothpost
