@@ -1,6 +1,7 @@
 #include "kernels/collision/collision_shape.h"
 
 #include <numeric>
+#include <utility>
 
 #include "kernels/core/contract.h"
 
@@ -31,8 +32,12 @@ std::vector<Vec3> seeds_of(const TriangleMesh& mesh) {
 
 }  // namespace
 
-CollisionShape::CollisionShape(MeshShape mesh) : shape_(std::move(mesh)) {
-  const TriangleTree* tree = std::get<MeshShape>(shape_).tree.get();
+CollisionShape::CollisionShape(ConvexShape convex)
+    : convex_(std::make_shared<const ConvexShape>(std::move(convex))) {}
+
+CollisionShape::CollisionShape(MeshShape mesh)
+    : mesh_(std::make_shared<const MeshShape>(std::move(mesh))) {
+  const TriangleTree* tree = mesh_->tree.get();
   require(tree != nullptr, "a mesh has its tree");
   for (int i = 0; i < 8; ++i)
     mesh_balls_.push_back(
@@ -40,13 +45,6 @@ CollisionShape::CollisionShape(MeshShape mesh) : shape_(std::move(mesh)) {
               (i & 4 ? tree->max() : tree->min()).z()),
          0.0});
 }
-
-const ConvexShape* CollisionShape::convex() const {
-  const auto* found = std::get_if<std::shared_ptr<const ConvexShape>>(&shape_);
-  return found ? found->get() : nullptr;
-}
-
-const MeshShape* CollisionShape::mesh() const { return std::get_if<MeshShape>(&shape_); }
 
 MeshShape mesh_shape(std::shared_ptr<const TriangleTree> tree, const TriangleMesh& mesh) {
   require(tree != nullptr, "a mesh has its tree");

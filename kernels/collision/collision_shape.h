@@ -1,7 +1,6 @@
 #pragma once
 
 #include <memory>
-#include <variant>
 #include <vector>
 
 #include "kernels/collision/convex_shape.h"
@@ -25,18 +24,18 @@ struct MeshShape {
 /// A body for collision checks: convex, or a mesh. Cheap to copy.
 class CollisionShape {
  public:
-  CollisionShape(ConvexShape convex)  // NOLINT(google-explicit-constructor)
-      : shape_(std::make_shared<const ConvexShape>(std::move(convex))) {}
-  CollisionShape(MeshShape mesh);  // NOLINT(google-explicit-constructor)
+  CollisionShape(ConvexShape convex);  // NOLINT(google-explicit-constructor)
+  CollisionShape(MeshShape mesh);      // NOLINT(google-explicit-constructor)
 
   /// One of the two is not null.
-  const ConvexShape* convex() const;
-  const MeshShape* mesh() const;
+  const ConvexShape* convex() const { return convex_.get(); }
+  const MeshShape* mesh() const { return mesh_.get(); }
   /// Balls whose convex hull contains the body.
-  const std::vector<Ball>& balls() const { return convex() ? convex()->balls() : mesh_balls_; }
+  const std::vector<Ball>& balls() const { return convex_ ? convex_->balls() : mesh_balls_; }
 
  private:
-  std::variant<std::shared_ptr<const ConvexShape>, MeshShape> shape_;
+  std::shared_ptr<const ConvexShape> convex_;
+  std::shared_ptr<const MeshShape> mesh_;
   std::vector<Ball> mesh_balls_;
 };
 

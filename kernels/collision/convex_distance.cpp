@@ -58,7 +58,11 @@ std::array<double, 4> closest_weights(const Vec3& a, const Vec3& b, const Vec3& 
   const double d3 = -ab.dot(b);
   const double d4 = -ac.dot(b);
   if (d3 >= 0.0 && d4 <= d3) return {0.0, 1.0, 0.0, 0.0};
-  const double vc = d1 * d4 - d3 * d2;
+  // Ericson's differences of products of dot products lose all digits on a triangle that is thin
+  // against its distance, as simplices on round bodies are; the same areas by cross products do
+  // not.
+  const Vec3 n = ab.cross(ac);
+  const double vc = n.dot(a.cross(b));
   if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) {
     const double share = d1 / (d1 - d3);
     return {1.0 - share, share, 0.0, 0.0};
@@ -66,12 +70,12 @@ std::array<double, 4> closest_weights(const Vec3& a, const Vec3& b, const Vec3& 
   const double d5 = -ab.dot(c);
   const double d6 = -ac.dot(c);
   if (d6 >= 0.0 && d5 <= d6) return {0.0, 0.0, 1.0, 0.0};
-  const double vb = d5 * d2 - d1 * d6;
+  const double vb = n.dot(c.cross(a));
   if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) {
     const double share = d2 / (d2 - d6);
     return {1.0 - share, 0.0, share, 0.0};
   }
-  const double va = d3 * d6 - d5 * d4;
+  const double va = n.dot(b.cross(c));
   if (va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0) {
     const double share = (d4 - d3) / ((d4 - d3) + (d5 - d6));
     return {0.0, 1.0 - share, share, 0.0};

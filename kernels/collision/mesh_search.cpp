@@ -446,11 +446,11 @@ MarginBounds mesh_margin(const TriangleTree& tree, const TriangleTree& body, con
   return DualSearch(tree, body, pose, query).run();
 }
 
-bool inside(const TriangleTree& tree, const Vec3& point) {
+bool inside(const TriangleTree& tree, const Vec3& point, std::uint32_t hint) {
   if (!tree.solid()) return false;
   if ((point.array() < tree.min().array()).any() || (point.array() > tree.max().array()).any())
     return false;
-  const double signed_distance = tree.closest(point).signed_distance;
+  const double signed_distance = tree.closest(point, hint).signed_distance;
   return tree.signed_volume() < 0.0 ? signed_distance > 0.0 : signed_distance < 0.0;
 }
 

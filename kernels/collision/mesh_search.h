@@ -72,6 +72,7 @@ MarginBounds mesh_margin(const TriangleTree& tree, const TriangleTree& body, con
                          const MarginQuery& query);
 
 /// Whether a point lies inside of what a solid mesh encloses; false for a mesh that is not solid.
-bool inside(const TriangleTree& tree, const Vec3& point);
+/// @param hint  a triangle that may be near   @pre as TriangleTree::closest()
+bool inside(const TriangleTree& tree, const Vec3& point, std::uint32_t hint = 0);
 
 }  // namespace smoothpost

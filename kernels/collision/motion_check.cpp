@@ -40,7 +40,7 @@ class MotionSearch {
     for (const std::size_t pair : pairs) {
       const MovementBound bound = scene_.movement_bound(pair, first, last);
       const double half = 0.5 * bound.travel;
-      const double around = deviation(bound);
+      const double around = deviation(bound) + reserve(pair);
       if (known(pair, poses, half + around)) continue;
       const PairMargin margin = scene_.search(
           pair, poses, {.want = wanted(pair, half + around), .decide = true, .need = half + around},
@@ -63,11 +63,14 @@ class MotionSearch {
     return check(begin, middle - share, open) && check(middle + share, end, open);
   }
 
+  /// With a cache a motion is free only with so much to spare that it would be found free without,
+  /// where pieces of at most the resolution have to be proven one by one.
+  double reserve(std::size_t pair) const {
+    return cache_ == nullptr ? 0.0 : 1.1 * settings_.resolution + scene_.tolerance(pair);
+  }
+
   bool known(std::size_t pair, const ScenePoses& poses, double needed) {
-    if (cache_ == nullptr) return false;
-    // As much more as makes sure that a search would have come to the same verdict.
-    const double more = 1.1 * settings_.resolution + scene_.tolerance(pair);
-    if (scene_.known_margin(pair, poses, *cache_) < needed + more) return false;
+    if (cache_ == nullptr || scene_.known_margin(pair, poses, *cache_) < needed) return false;
     ++cache_->skipped_;
     ++report_.skipped;
     return true;
@@ -106,7 +109,7 @@ MotionReport check_motion(const Scene& scene, const JointVector& from, const Joi
           "no deviation, or one of at least 0 per joint");
   const MotionReport report = MotionSearch(scene, from, to, settings, cache).run();
   if (cache == nullptr || report.verdict == MotionVerdict::free) return report;
-  // The place that is told must not depend on what the cache happened to know.
+  // What is told must not depend on what the cache happened to know.
   MotionReport again = MotionSearch(scene, from, to, settings, nullptr).run();
   again.queries += report.queries;
   again.skipped += report.skipped;

@@ -38,8 +38,9 @@ struct MotionReport {
 ///
 /// Guarantees (tests): never free where dense sampling finds a margin below 0, with any deviation
 /// inside of the box; free whenever the least margin is above resolution and gap; `hit` comes with
-/// a margin below 0 at t; verdict, t and pair with a cache are those without (a motion that is not
-/// free is searched again without it).
+/// a margin below 0 at t; verdict, t and pair with a cache are those without, while the deviations
+/// of rotary joints sum to less than 0.1 rad (a motion that the cache does not prove with
+/// resolution and gap to spare is searched again without it).
 /// The ends belong to the motion. Between them nothing is assumed but straight joints; controllers
 /// that leave them need the deviation.
 /// Cost: one search per pair and piece; pieces ≈ travel / margin.

@@ -51,6 +51,7 @@ struct LocalMargin {
   Vec3 on_second = Vec3::Zero();
   Vec3 normal = Vec3::UnitZ();
   std::uint32_t triangle = PairMargin::kNoTriangle;
+  bool in_second = true;  ///< whose frame it is
 };
 
 LocalMargin from_mesh(const MarginBounds& bounds, bool mesh_is_second) {
@@ -60,6 +61,7 @@ LocalMargin from_mesh(const MarginBounds& bounds, bool mesh_is_second) {
   if (mesh_is_second) return out;
   std::swap(out.on_first, out.on_second);
   out.normal = -out.normal;
+  out.in_second = false;
   return out;
 }
 
@@ -105,22 +107,45 @@ struct Enclosed {
   std::uint32_t triangle = 0;
 };
 
-template <class Points>
-std::optional<Enclosed> enclosed(const MeshShape& mesh, const Points& points, const Pose& pose) {
+std::optional<Enclosed> enclosed(const MeshShape& mesh, const std::vector<Vec3>& points,
+                                 const Pose& pose, std::uint32_t hint) {
   for (const Vec3& p : points) {
     const Vec3 point = pose * p;
-    if (!inside(*mesh.tree, point)) continue;
-    const ClosestPoint closest = mesh.tree->closest(point);
+    if (!inside(*mesh.tree, point, hint)) continue;
+    const ClosestPoint closest = mesh.tree->closest(point, hint);
     const Vec3 out = mesh.tree->signed_volume() < 0.0 ? Vec3(-closest.normal) : closest.normal;
     return Enclosed{point, out, closest.triangle};
   }
   return std::nullopt;
 }
 
+/// What has to be asked of insides: points of a body whose partner is a solid mesh.
+struct PairSeeds {
+  std::vector<Vec3> of_first;
+  std::vector<Vec3> of_second;
+};
+
 /// Points of a body one of which is inside of a solid if the body is, while surfaces are apart.
 std::vector<Vec3> seeds_of(const CollisionShape& shape) {
   if (const ConvexShape* convex = shape.convex()) return {convex->core_frame().translation()};
   return shape.mesh()->seeds;
+}
+
+/// Where surfaces may cross in the exempt ball: points outside of it, of a convex body the farthest
+/// from it among those that stick out most.
+std::vector<Vec3> seeds_outside(const CollisionShape& shape, const ExemptSphere& ball) {
+  std::vector<Vec3> points = seeds_of(shape);
+  const auto from_ball = [&](const Vec3& p) { return (p - ball.centre).norm(); };
+  if (const ConvexShape* convex = shape.convex())
+    for (const double sign : {-1.0, 1.0})
+      for (int axis = 0; axis < 3; ++axis) {
+        const Vec3 p = convex->core_frame() * convex->support(sign * Vec3::Unit(axis));
+        if (from_ball(p) > from_ball(points[0])) points[0] = p;
+      }
+  points.erase(std::remove_if(points.begin(), points.end(),
+                              [&](const Vec3& p) { return from_ball(p) < ball.radius; }),
+               points.end());
+  return points;
 }
 
 }  // namespace
@@ -131,8 +156,7 @@ struct Scene::Data {
     std::vector<Ball> balls;   // of it, in its coordinates
     std::vector<Ball> placed;  // of it, in M with every joint at 0
     ChainPath path;
-    std::vector<Vec3> first_seeds;
-    std::vector<Vec3> second_seeds;
+    PairSeeds seeds;
     double clearance = 0.0;
   };
   ScrewChain chain;
@@ -164,8 +188,11 @@ Scene::Data::Pair Scene::Data::prepare(const ScenePair& pair) const {
   out.path = path_between(chain, carrying_joint(chain, mover), carrying_joint(chain, other));
   const MeshShape* of_first = first.shape.mesh();
   const MeshShape* of_second = second.shape.mesh();
-  if (of_second && of_second->tree->solid()) out.first_seeds = seeds_of(first.shape);
-  if (of_first && of_first->tree->solid()) out.second_seeds = seeds_of(second.shape);
+  if (of_second && of_second->tree->solid())
+    out.seeds.of_first =
+        pair.exempt ? seeds_outside(first.shape, *pair.exempt) : seeds_of(first.shape);
+  if (of_first && of_first->tree->solid() && !pair.exempt)
+    out.seeds.of_second = seeds_of(second.shape);
   return out;
 }
 
@@ -296,6 +323,51 @@ double Scene::known_margin(std::size_t pair, const ScenePoses& poses,
   return known.lower - displacement(p.balls, known.second_first, now);
 }
 
+namespace {
+
+/// Of what the bodies are made of: triangles, and convex bodies with their insides.
+LocalMargin surface_margin(const CollisionShape& first, const CollisionShape& second,
+                           const Pose& second_first, const MarginQuery& query) {
+  const MeshShape* first_mesh = first.mesh();
+  const MeshShape* second_mesh = second.mesh();
+  if (second_mesh != nullptr && first_mesh != nullptr)
+    return from_mesh(mesh_margin(*second_mesh->tree, *first_mesh->tree, second_first, query), true);
+  if (second_mesh != nullptr)
+    return from_mesh(mesh_margin(*second_mesh->tree, *first.convex(), second_first, query), true);
+  if (first_mesh != nullptr)
+    return from_mesh(
+        mesh_margin(*first_mesh->tree, *second.convex(), second_first.inverse(), query), false);
+  return convex_margin(*first.convex(), *second.convex(), second_first, query.clearance,
+                       query.want);
+}
+
+/// The margin of a pair one of which is inside of the other one's solid mesh, if it is.
+std::optional<LocalMargin> enclosed_margin(const CollisionShape& first,
+                                           const CollisionShape& second, const Pose& second_first,
+                                           const PairSeeds& seeds, const MarginQuery& query) {
+  const std::uint32_t hint = query.hint.value_or(0);
+  const double clearance = query.clearance;
+  bool in_second = true;
+  std::optional<Enclosed> in;
+  if (!seeds.of_first.empty()) in = enclosed(*second.mesh(), seeds.of_first, second_first, hint);
+  if (!in && !seeds.of_second.empty()) {
+    in_second = false;
+    in = enclosed(*first.mesh(), seeds.of_second, second_first.inverse(), 0);
+  }
+  if (!in) return std::nullopt;
+  return LocalMargin{.lower = -clearance,
+                     .upper = -clearance,
+                     .found = true,
+                     .distance = 0.0,
+                     .on_first = in->point,
+                     .on_second = in->point,
+                     .normal = in_second ? in->normal : Vec3(-in->normal),
+                     .triangle = in->triangle,
+                     .in_second = in_second};
+}
+
+}  // namespace
+
 PairMargin Scene::search(std::size_t pair, const ScenePoses& poses, const Wish& wish,
                          SceneCache* cache) const {
   prepare(cache);
@@ -306,54 +378,17 @@ PairMargin Scene::search(std::size_t pair, const ScenePoses& poses, const Wish& 
   const Pose& at_first = Data::pose_of(first, poses.links_, poses.workpiece_);
   const Pose& at_second = Data::pose_of(second, poses.links_, poses.workpiece_);
   const Pose second_first = at_second.inverse() * at_first;
-  const MeshShape* first_mesh = first.shape.mesh();
-  const MeshShape* second_mesh = second.shape.mesh();
 
   MarginQuery query{
       .clearance = p.clearance, .want = wish.want, .decide = wish.decide, .need = wish.need};
   if (asked.exempt)
     query.exempt = ExemptBall{second_first * asked.exempt->centre, asked.exempt->radius};
   if (cache != nullptr) query.hint = cache->pairs_[pair].triangle;
-
-  LocalMargin local;
-  bool in_second = true;  // the frame of `local`
-  if (second_mesh != nullptr) {
-    local =
-        from_mesh(first_mesh != nullptr
-                      ? mesh_margin(*second_mesh->tree, *first_mesh->tree, second_first, query)
-                      : mesh_margin(*second_mesh->tree, *first.shape.convex(), second_first, query),
-                  true);
-  } else if (first_mesh != nullptr) {
-    in_second = false;
-    local = from_mesh(
-        mesh_margin(*first_mesh->tree, *second.shape.convex(), second_first.inverse(), query),
-        false);
-  } else {
-    local = convex_margin(*first.shape.convex(), *second.shape.convex(), second_first, p.clearance,
-                          wish.want);
-  }
-
+  LocalMargin local = surface_margin(first.shape, second.shape, second_first, query);
   // Surfaces apart: one body may still be inside of the other.
-  if (!(local.found && local.distance <= 0.0)) {
-    std::optional<Enclosed> in;
-    bool seed_of_first = true;
-    if (!p.first_seeds.empty()) in = enclosed(*second_mesh, p.first_seeds, second_first);
-    if (!in && !p.second_seeds.empty()) {
-      seed_of_first = false;
-      in = enclosed(*first_mesh, p.second_seeds, second_first.inverse());
-    }
-    if (in && -p.clearance < wish.want) {
-      in_second = seed_of_first;
-      local = {.lower = -p.clearance,
-               .upper = -p.clearance,
-               .found = true,
-               .distance = 0.0,
-               .on_first = in->point,
-               .on_second = in->point,
-               .normal = seed_of_first ? in->normal : Vec3(-in->normal),
-               .triangle = in->triangle};
-    }
-  }
+  if (!(local.found && local.distance <= 0.0) && -p.clearance < wish.want)
+    if (auto in = enclosed_margin(first.shape, second.shape, second_first, p.seeds, query))
+      local = *in;
 
   PairMargin out;
   out.lower = local.lower;
@@ -361,7 +396,7 @@ PairMargin Scene::search(std::size_t pair, const ScenePoses& poses, const Wish& 
   out.found = local.found;
   out.triangle = local.triangle;
   if (local.found) {
-    const Pose to_w = poses.workpiece_.inverse() * (in_second ? at_second : at_first);
+    const Pose to_w = poses.workpiece_.inverse() * (local.in_second ? at_second : at_first);
     out.distance = local.distance;
     out.on_first = to_w * local.on_first;
     out.on_second = to_w * local.on_second;
@@ -390,16 +425,26 @@ bool Scene::free(const JointVector& q, SceneCache* cache) const {
   const ScenePoses at = poses(q);
   for (std::size_t pair = 0; pair < pairs().size(); ++pair) {
     const double gap = tolerance(pair);
-    double want = gap;
     if (cache != nullptr) {
       const double known = known_margin(pair, at, *cache);
+      SceneCache::Known& last = cache->pairs_[pair];
       if (known >= gap) {
         ++cache->skipped_;
+        ++last.skips;
         continue;
       }
-      want += look_ahead(cache->pairs_[pair].known ? cache->pairs_[pair].lower - known : 0.0);
+      // Knowing more than is needed costs time; it is tried again now and then where it saved none.
+      const bool worth = last.skips >= 2 || last.searches % 8 == 0;
+      const double ahead = worth ? look_ahead(last.known ? last.lower - known : 0.0) : 0.0;
+      ++last.searches;
+      last.skips = 0;
+      const PairMargin found =
+          search(pair, at, {.want = gap + ahead, .decide = true, .need = gap}, cache);
+      if (found.lower >= gap) continue;
+      if (found.found && found.upper < 0.0) return false;
+      // Nearer to the limit than the gap: as without a cache.
     }
-    if (search(pair, at, {.want = want, .decide = true}, cache).lower < 0.0) return false;
+    if (search(pair, at, {.want = gap, .decide = true}, nullptr).lower < 0.0) return false;
   }
   return true;
 }

@@ -38,8 +38,9 @@ struct SceneBody {
 /// move against each other: so what is said of motions holds for it as well.
 /// What it does not prove: anything about points inside of the ball. With the ball about the tip of
 /// a laser's nozzle that is the sheet under the nozzle and whatever else is that near to the tip
-/// (the gap check looks at the land); the nozzle may even touch it there, and so may the rest of
-/// the body within the ball.
+/// (the gap check looks at the land); the nozzle may even touch or cut it there. And a body that is
+/// partly inside of a solid, with all of the solid's surface that it cuts in the ball, is only seen
+/// if its farthest extreme point from the ball is inside; no motion from outside leads there.
 struct ExemptSphere {
   Vec3 centre = Vec3::Zero();  ///< mm
   double radius = 0.0;         ///< mm, > 0
@@ -75,7 +76,7 @@ inline constexpr double kTouching = 1e-6;
 struct PairMargin {
   /// mm: the margin, distance − clearance (see ExemptSphere), is proven to be at least this.
   double lower = 0.0;
-  /// Margin of the witness: the margin is at most this. upper − lower ≤ 1e-5 mm, with an exempt
+  /// Margin of the witness: the margin is at most this. upper − lower ≤ 2e-6 mm, with an exempt
   /// sphere ≤ max(2e-3 mm, 5 % of it). Where no margin below the asked one was found, both are
   /// that.
   double upper = 0.0;
@@ -84,7 +85,8 @@ struct PairMargin {
   Vec3 on_first = Vec3::Zero();  ///< mm; a common point when the bodies overlap
   Vec3 on_second = Vec3::Zero();
   Vec3 normal = Vec3::UnitZ();  ///< unit, from second to first
-  /// Triangle of the mesh that on_second (else on_first) lies on; kNoTriangle without a mesh.
+  /// Triangle of the mesh that on_second (else on_first) lies on; of a body inside of a solid the
+  /// triangle nearest to it; kNoTriangle without a mesh.
   std::uint32_t triangle = kNoTriangle;
   static constexpr std::uint32_t kNoTriangle = std::numeric_limits<std::uint32_t>::max();
 };
@@ -132,6 +134,8 @@ class SceneCache {
     Pose second_first = Pose::Identity();
     double lower = 0.0;
     std::optional<std::uint32_t> triangle;
+    int skips = 0;     // since the last search
+    int searches = 0;  // by free()
   };
   std::shared_ptr<const void> scene_;
   std::vector<Known> pairs_;

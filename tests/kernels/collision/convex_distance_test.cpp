@@ -101,7 +101,7 @@ TEST_CASE("convex_distance: both bounds are proven by what is returned", "[kerne
     REQUIRE(of_body - of_triangle >= found.lower - 1e-9);
   }
   CHECK(overlaps > 4000);
-  CHECK(gap < 1e-5);  // triangles of up to 1 m
+  CHECK(gap < 1e-6);  // triangles of up to 1 m
 }
 
 TEST_CASE("convex_distance: closed forms of capsules, boxes and points", "[kernels][collision]") {

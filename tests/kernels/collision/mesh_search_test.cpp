@@ -190,6 +190,27 @@ TEST_CASE("mesh_search: an exempt ball that holds everything, and one that holds
   CHECK(none.lower == Approx(-1.3).margin(exempt_tolerance(-1.3)));
 }
 
+TEST_CASE("mesh_search: a sheet that leaves the exempt ball sideways", "[kernels][collision]") {
+  NEEDS_TREE();
+  // Parallel to the body's face, 3 mm below it: too near by 0.5 mm, and out of the ball beyond 5.2
+  // mm from the middle, where both terms of the margin, taken at the middle, are still above 0.
+  const auto body = ConvexShape::box({-30, -30, 0}, {30, 30, 20});
+  for (const int cells : {1, 7, 60}) {
+    const MeshShape shape = test::mesh_of(weld(test::sheet(
+        [](double u, double v) { return Vec3(40 * u - 20, 40 * v - 20, -3); }, cells, cells)));
+    MarginQuery query{
+        .clearance = 3.5, .exempt = ExemptBall{{0, 0, 100}, 104.0}, .want = 2e-3, .decide = true};
+    CHECK(mesh_margin(*shape.tree, body, Pose::Identity(), query).upper < 0.0);
+    query.decide = false;
+    query.want = 10.0;
+    CHECK(mesh_margin(*shape.tree, body, Pose::Identity(), query).upper ==
+          Approx(-0.5).margin(0.03));
+    query.exempt->radius = 110.0;  // holds all of the sheet
+    CHECK(mesh_margin(*shape.tree, body, Pose::Identity(), query).upper ==
+          Approx(110.0 - std::sqrt(103.0 * 103.0 + 800.0)).epsilon(0.06));
+  }
+}
+
 TEST_CASE("mesh_search: two meshes, against every pair of triangles", "[kernels][collision]") {
   NEEDS_TREE();
   std::mt19937 random(24);

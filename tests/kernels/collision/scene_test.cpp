@@ -198,6 +198,17 @@ TEST_CASE("scene: what is inside of a solid is not free", "[kernels][collision]"
   CHECK_FALSE(scene_of(test::mesh_of(weld(two)), solid).free(q));
   CHECK_FALSE(scene_of(solid, test::mesh_of(weld(two))).free(q));
   CHECK_FALSE(scene_of(solid, solid).free(q));
+  // With an exempt ball it is the part outside of the ball that must not be inside.
+  const auto exempt_scene = [&](double radius) {
+    const CollisionShape stick = ConvexShape::capsule({0, 0, 0}, {0, 0, 50}, 1.0);
+    return Scene(
+        test::laser_chain(),
+        {{.name = "a", .joint = 5, .shape = stick},
+         {.name = "b", .joint = SceneBody::kWorkpiece, .shape = solid}},
+        {{.first = 0, .second = 1, .clearance = 0.0, .exempt = ExemptSphere{{0, 0, 0}, radius}}});
+  };
+  CHECK_FALSE(exempt_scene(40.0).free(q));
+  CHECK(exempt_scene(200.0).free(q));
 }
 
 TEST_CASE("scene: touching bodies are not free, whatever the clearance", "[kernels][collision]") {
@@ -338,6 +349,40 @@ TEST_CASE("scene: margins change no more than the bodies move", "[kernels][colli
     }
   }
   CHECK(tightest > 0.8);
+}
+
+TEST_CASE("scene: an exempt ball that moves more than its body", "[kernels][collision]") {
+  NEEDS_TREE();
+  // The ball's centre is far from the tip about which B turns the nozzle, the part 40 mm deep in
+  // the ball: the margin follows the ball.
+  auto part = test::box({-1, -1, -301}, {1, 1, -299});
+  const auto far = test::box({-1, -1, -3001}, {1, 1, -2999});  // makes the nozzle the smaller one
+  part.insert(part.end(), far.begin(), far.end());
+  const Scene scene(test::laser_chain(), {test::nozzle_body(), test::part_body(weld(part))},
+                    {{.first = 0,
+                      .second = 1,
+                      .clearance = 290.0,
+                      .exempt = ExemptSphere{{300, 0, -300}, 340.0}}});
+  std::mt19937 random(48);
+  int more = 0;
+  for (int i = 0; i < 200; ++i) {
+    const JointVector a = 1e-3 * test::random_joints(random, scene.chain(), 500.0, 20.0);
+    JointVector b = a;
+    b[test::kB] += test::uniform(random, -0.05, 0.05);
+    const auto from = scene.poses(a);
+    const auto to = scene.poses(b);
+    SceneCache cache;
+    const PairMargin before = scene.margin(0, from, 200.0, &cache);
+    const PairMargin after = scene.margin(0, to, 200.0);
+    REQUIRE(after.upper >= before.lower - scene.movement(0, from, to));
+    REQUIRE(after.upper >= scene.known_margin(0, to, cache));
+    REQUIRE(scene.movement_bound(0, a, b).travel >= scene.movement(0, from, to) - 1e-9);
+    const double nozzle =
+        displacement(scene.bodies()[0].shape.balls(), link_poses(scene.chain(), a)[6],
+                     link_poses(scene.chain(), b)[6]);
+    more += before.lower - after.upper > nozzle;
+  }
+  CHECK(more > 50);
 }
 
 TEST_CASE("scene: bodies of the machine against each other", "[kernels][collision]") {
