@@ -71,11 +71,11 @@ class FeedProfile {
 struct FeedSettings {
   double element_time = 0.007;  ///< s of motion per spline element of the last grid
   int least_elements = 40;
-  bool tighten = true;         ///< one more solve with the rows drawn in where they overshoot
-                               ///< (from a given speed up to two)
+  bool tighten = true;         ///< up to three more solves with the rows drawn in where they
+                               ///< overshoot (from a given speed up to two)
   double margin = 3e-5;        ///< relative, by which the last dilation goes beyond the check
   double smooth_share = 1e-4;  ///< relative jump of q', q'' at a break that counts as smooth
-  std::size_t window_points = 100000;  ///< above this many collocation points: windows
+  std::size_t window_points = 600000;  ///< above this many collocation points: windows
   double look_ahead = 0.4;             ///< s, of a window
 };
 
@@ -103,8 +103,9 @@ struct FeedResult {
 ///   T = ∫ b^{−1/2} dw   such that for every joint, and for the tip's arc length in place of q,
 ///   |q_w| √b ≤ V,   |q_ww b + q_w b'/2| ≤ A,   √b |q_www b + 3/2 q_ww b' + q_w b''/2| ≤ J,
 /// and feed, rate and turn rate cap b. The rest at an end lies in φ ~ w³ and holds for any b.
-/// One interior point (solve_feed) on a coarse grid, then on one that is even in time; elements
-/// that overshoot are cut, and drawn in once; at last all times are stretched by the least factor
+/// One interior point (solve_feed, in overlapping parts: solve_in_parts) on a coarse grid, then on
+/// one that is even in time and finer where the path's own jerk goes up and down; elements that
+/// overshoot are drawn in, up to three times; at last all times are stretched by the least factor
 /// that brings 40 places an element below every limit, times 1 + margin. Above `window_points`:
 /// windows of 8 look-aheads. Each starts from a state of the one before, ends at rest (so there is
 /// always a stop), and has limits that sink by 0.3 % to its end; it is kept up to a look-ahead
@@ -120,11 +121,12 @@ struct FeedResult {
 /// Rest to rest there is always a law (b = const is one) unless the path is refused; with a
 /// witness: see FeedStatus. What counts as a jump of q' or q'': survey() in feed_survey.h.
 ///
-/// Units: mm, rad, s; s as in FeedPath. No threads. Memory: 1 kB a collocation point (five an
-/// element), of one window at most, and 100 bytes an element of the law.
-/// Cost: about 7 calls of path.jet an element and 4 a piece, more where jets cannot be interpolated
-/// between them to 1e-6; 0.2 to 0.4 µs a collocation point and iteration, 20 to 40 iterations a
-/// solve, two to six solves.
+/// Units: mm, rad, s; s as in FeedPath. Calls path.jet on the caller's thread only; parts are
+/// solved on all threads (TBB), with the same bits. Memory: 0.4 kB a collocation point (five an
+/// element) of one window at most, 1 kB a point of the parts that are being solved, and 100 bytes
+/// an element of the law. Cost: about 7 calls of path.jet an element and 4 a piece, more where jets
+/// cannot be interpolated between them to 1e-6; 0.2 to 0.4 µs a collocation point and iteration, 20
+/// to 60 iterations a solve, two to five solves.
 /// @pre breaks ascend, feed (and rate, unless empty) fit the pieces, jets have as many joints as
 /// the limits, at most 12; given speeds > 0; settings > 0   @throws ContractViolation Not from a
 /// paper: the papers run at constant feed. Derived in the rows of docs/equations.md.

@@ -15,6 +15,17 @@ constexpr double kMostFall = 0.9 * kToBoundary;  // of b in one step
 constexpr double kLeastSlack = 1e-14;
 constexpr double kStartSlack = 0.02;  // of rows that the start breaks
 constexpr double kLeastCurvature = 0.05;
+constexpr double kStartGap = 0.3;  // of T, at least: less hugs the rows far from the optimum
+
+// The lane loops are compiled twice: with four lanes an instruction where the processor has AVX2,
+// the same operations in the same order, so the same bits. Sanitizers do not bear the dispatch.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
+    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define SMOOTHPOST_LANES __attribute__((target_clones("avx2", "default")))
+#else
+#define SMOOTHPOST_LANES
+#endif
+#define SMOOTHPOST_INLINE inline __attribute__((always_inline))
 
 using Local = std::array<double, 3>;  // b, b', b'' at a point, or their change
 
@@ -40,7 +51,7 @@ double slope_of(double b) { return -0.5 / (b * std::sqrt(b)); }  // of b^{−1/2
 
 /// c(v) of every row of a point.
 template <int P>
-void lane_slacks(const PointView& p, const Local& v, double* __restrict c) {
+SMOOTHPOST_INLINE void lane_slacks(const PointView& p, const Local& v, double* __restrict c) {
   const double r = 1.0 / std::sqrt(v[0]);
   for (int l = 0; l < P; ++l) {
     const double ia = p.factor_a * p.inv_a[l], ij = p.factor_j * p.inv_j[l];
@@ -55,7 +66,8 @@ void lane_slacks(const PointView& p, const Local& v, double* __restrict c) {
 
 /// ds of every row: g·dx + ρ.
 template <int P>
-void lane_changes(const PointView& p, const Local& v, const Local& dv, double* __restrict ds) {
+SMOOTHPOST_INLINE void lane_changes(const PointView& p, const Local& v, const Local& dv,
+                                    double* __restrict ds) {
   const double r = 1.0 / std::sqrt(v[0]), bend = slope_of(v[0]) * dv[0];
   const Local sum{v[0] + dv[0], v[1] + dv[1], v[2] + dv[2]};
   const double root = r + bend;
@@ -77,7 +89,7 @@ struct Ratios {
 };
 
 template <int P>
-Ratios lane_ratios(const PointView& p, const double* ds, double centre) {
+SMOOTHPOST_INLINE Ratios lane_ratios(const PointView& p, const double* ds, double centre) {
   std::array<double, P> primal{}, dual{};
   for (int row = 0; row < 4; ++row) {
     const double* s = p.s + row * P;
@@ -101,7 +113,8 @@ struct Step {
 
 /// s and z after a step; `c` are the true slacks at the new place.
 template <int P>
-void lane_update(const PointView& p, const double* ds, const double* c, const Step& step) {
+SMOOTHPOST_INLINE void lane_update(const PointView& p, const double* ds, const double* c,
+                                   const Step& step) {
   for (int i = 0; i < 4 * P; ++i) {
     const double s = p.s[i], z = p.z[i];
     const double dz = (step.centre - z * ds[i]) / s - z;
@@ -113,14 +126,14 @@ void lane_update(const PointView& p, const double* ds, const double* c, const St
 }
 
 template <int P>
-double lane_total(const double* values) {
+SMOOTHPOST_INLINE double lane_total(const double* values) {
   double total = 0.0;
   for (int l = 0; l < P; ++l) total += values[l];
   return total;
 }
 
 template <int P>
-PointSums lane_sums(const PointView& p, const Local& v) {
+SMOOTHPOST_INLINE PointSums lane_sums(const PointView& p, const Local& v) {
   constexpr int kSums = 18;
   alignas(64) double sum[kSums][P];
   const double r = 1.0 / std::sqrt(v[0]), r1 = slope_of(v[0]);
@@ -171,6 +184,31 @@ PointSums lane_sums(const PointView& p, const Local& v) {
   out.lack = *std::min_element(sum[17], sum[17] + P);
   return out;
 }
+
+template <int P>
+struct Width {};
+
+// Each of these is a whole pass over the lanes of a point.
+#define SMOOTHPOST_PASSES(P)                                                                   \
+  SMOOTHPOST_LANES PointSums sums(Width<P>, const PointView& p, const Local& v) {              \
+    return lane_sums<P>(p, v);                                                                 \
+  }                                                                                            \
+  SMOOTHPOST_LANES Ratios falls(Width<P>, const PointView& p, const Local& v, const Local& dv, \
+                                double centre) {                                               \
+    alignas(64) double ds[4 * P];                                                              \
+    lane_changes<P>(p, v, dv, ds);                                                             \
+    return lane_ratios<P>(p, ds, centre);                                                      \
+  }                                                                                            \
+  SMOOTHPOST_LANES void update(Width<P>, const PointView& p, const Local& v, const Local& dv,  \
+                               const Local& now, const Step& step) {                           \
+    alignas(64) double ds[4 * P], c[4 * P];                                                    \
+    lane_changes<P>(p, v, dv, ds);                                                             \
+    lane_slacks<P>(p, now, c);                                                                 \
+    lane_update<P>(p, ds, c, step);                                                            \
+  }
+SMOOTHPOST_PASSES(8)
+SMOOTHPOST_PASSES(16)
+#undef SMOOTHPOST_PASSES
 
 /// The iteration for P lanes.
 template <int P>
@@ -239,18 +277,19 @@ class FeedIteration {
     return solution;
   }
 
-  /// Largest ratios at the points.
-  FeedProgram::Factors ratios() {
-    FeedProgram::Factors worst{0.0, 0.0, 0.0};
+  /// Largest ratios at the points of every element.
+  std::vector<FeedProgram::Factors> ratios() {
+    std::vector<FeedProgram::Factors> worst(grid_.elements.size(), {0.0, 0.0, 0.0});
     alignas(64) double c[4 * P];
     for_points([&](std::size_t i, std::size_t e, int) {
       const Local v = local(x_, i, e);
       lane_slacks<P>(view(i), v, c);
       const double root = std::sqrt(v[0]);
-      worst.velocity = std::max(worst.velocity, std::sqrt(v[0] * inv_cap_[i]));
+      FeedProgram::Factors& most = worst[e];
+      most.velocity = std::max(most.velocity, std::sqrt(v[0] * inv_cap_[i]));
       for (int l = 0; l < P; ++l) {
-        worst.acceleration = std::max(worst.acceleration, std::abs(c[l] - c[P + l]) * 0.5);
-        worst.jerk = std::max(worst.jerk, std::abs(c[2 * P + l] - c[3 * P + l]) * 0.5 * root);
+        most.acceleration = std::max(most.acceleration, std::abs(c[l] - c[P + l]) * 0.5);
+        most.jerk = std::max(most.jerk, std::abs(c[2 * P + l] - c[3 * P + l]) * 0.5 * root);
       }
     });
     return worst;
@@ -303,7 +342,7 @@ class FeedIteration {
       norm += centre_[k] * centre_[k];
     }
     const double rows = static_cast<double>((4 * P + 1) * grid_.points());
-    const double mu = norm > 0.0 ? std::clamp(fit / norm, 1e-6 * objective_ / rows, 1e3) : 1.0;
+    const double mu = norm > 0.0 ? std::clamp(fit / norm, kStartGap * objective_ / rows, 1e3) : 1.0;
     for (std::size_t k = 0; k < slack_.size(); ++k) multiplier_[k] = mu / slack_[k];
     for (std::size_t i = 0; i < cap_slack_.size(); ++i) cap_multiplier_[i] = mu / cap_slack_[i];
     assemble();
@@ -329,7 +368,7 @@ class FeedIteration {
   void add_point(std::size_t i, std::size_t e) {
     const Local v = local(x_, i, e);
     const double r = 1.0 / std::sqrt(v[0]), r1 = slope_of(v[0]), r2 = -1.5 * r1 / v[0];
-    PointSums sums = lane_sums<P>(view(i), v);
+    PointSums sums = smoothpost::sums(Width<P>{}, view(i), v);
     const double inv_s = 1.0 / cap_slack_[i], z = cap_multiplier_[i], g = -inv_cap_[i];
     const double rho = 1.0 + g * v[0] - cap_slack_[i];
     sums.hessian[0] += z * inv_s * g * g;
@@ -389,12 +428,9 @@ class FeedIteration {
 
   Ratios largest_falls(double centre) {
     Ratios worst;
-    alignas(64) double ds[4 * P];
     for_points([&](std::size_t i, std::size_t e, int) {
       const Local v = local(x_, i, e), dv = local(dx_, i, e);
-      const PointView p = view(i);
-      lane_changes<P>(p, v, dv, ds);
-      const Ratios here = lane_ratios<P>(p, ds, centre);
+      const Ratios here = falls(Width<P>{}, view(i), v, dv, centre);
       const double change = 1.0 - inv_cap_[i] * (v[0] + dv[0]) - cap_slack_[i];
       const double fall = -change / cap_slack_[i];
       const double dual = 1.0 - fall - centre / (cap_slack_[i] * cap_multiplier_[i]);
@@ -408,14 +444,10 @@ class FeedIteration {
   void advance(const Step& step) {
     old_ = x_;
     for (std::size_t k = 0; k < x_.size(); ++k) x_[k] += step.primal * dx_[k];
-    alignas(64) double ds[4 * P], c[4 * P];
     clear();
     for_points([&](std::size_t i, std::size_t e, int) {
       const Local v = local(old_, i, e), dv = local(dx_, i, e), now = local(x_, i, e);
-      const PointView p = view(i);
-      lane_changes<P>(p, v, dv, ds);
-      lane_slacks<P>(p, now, c);
-      lane_update<P>(p, ds, c, step);
+      update(Width<P>{}, view(i), v, dv, now, step);
       const double s = cap_slack_[i], z = cap_multiplier_[i];
       const double change = 1.0 - inv_cap_[i] * (v[0] + dv[0]) - s;
       cap_multiplier_[i] += step.dual * ((step.centre - z * change) / s - z);
@@ -453,10 +485,31 @@ FeedSolution solve_feed(const FeedProgram& program, std::vector<double> start,
   return FeedIteration<16>(program, std::move(start)).solve(settings);
 }
 
-FeedProgram::Factors point_ratios(const FeedProgram& program, const std::vector<double>& controls) {
+namespace {
+
+std::vector<FeedProgram::Factors> element_ratios(const FeedProgram& program,
+                                                 const std::vector<double>& controls) {
   check(program, controls);
   if (program.grid->width == 8) return FeedIteration<8>(program, controls).ratios();
   return FeedIteration<16>(program, controls).ratios();
+}
+
+}  // namespace
+
+FeedProgram::Factors point_ratios(const FeedProgram& program, const std::vector<double>& controls) {
+  FeedProgram::Factors worst{0.0, 0.0, 0.0};
+  for (const FeedProgram::Factors& r : element_ratios(program, controls))
+    worst = {std::max(worst.velocity, r.velocity), std::max(worst.acceleration, r.acceleration),
+             std::max(worst.jerk, r.jerk)};
+  return worst;
+}
+
+std::vector<double> element_dilations(const FeedProgram& program,
+                                      const std::vector<double>& controls) {
+  std::vector<double> out;
+  for (const FeedProgram::Factors& r : element_ratios(program, controls))
+    out.push_back(std::max({r.velocity, std::sqrt(r.acceleration), std::cbrt(r.jerk)}));
+  return out;
 }
 
 double constant_law(const FeedProgram& program) {

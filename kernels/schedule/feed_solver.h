@@ -56,6 +56,11 @@ FeedSolution solve_feed(const FeedProgram& program, std::vector<double> start,
 /// limits. All are ≤ 1 where the law is feasible; with b/c² they fall by c, c², c³.
 FeedProgram::Factors point_ratios(const FeedProgram& program, const std::vector<double>& controls);
 
+/// The least factor of all times, for each element by itself, that would bring its points inside:
+/// max(v, √a, ∛j) of their ratios, not below 0.
+std::vector<double> element_dilations(const FeedProgram& program,
+                                      const std::vector<double>& controls);
+
 /// Largest β for which b = β keeps every row at the points.
 double constant_law(const FeedProgram& program);
 

@@ -99,7 +99,7 @@ class Schedule {
     StretchSettings result;
     result.element_time = settings_.element_time;
     result.least_elements = settings_.least_elements;
-    result.tightenings = settings_.tighten ? (moving ? 2 : 1) : 0;
+    result.tightenings = settings_.tighten ? (moving ? 2 : 3) : 0;
     if (moving) {
       result.points = kMovingPoints;
       result.lower = kInside;

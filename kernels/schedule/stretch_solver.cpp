@@ -1,47 +1,76 @@
 #include "kernels/schedule/stretch_solver.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+
+#include "kernels/schedule/feed_parts.h"
+#include "kernels/schedule/feed_start.h"
 
 namespace smoothpost {
 namespace {
 
 constexpr int kCoarsePoints = 5;
 constexpr int kLeastCoarse = 20;
-constexpr double kFirstShare = 0.5;    // of the largest constant b, at the start
-constexpr double kAgainShare = 0.7;    // of the coarse law, at the start of the fine grid
-constexpr double kTimeShare = 0.85;    // of the measure of the fine grid; the rest is w
-constexpr double kNearLimit = 0.9999;  // loads above it are drawn in
+constexpr double kFirstShare = 0.5;  // of the largest constant b, at the start
+constexpr double kCoarseGap = 1e-3, kFineGap = 1e-4, kLastGap = 1e-5;  // of solves, relative to T
+constexpr double kMostFiner = 40.0;     // fine elements a coarse one, in the mean
+constexpr double kTightEnough = 1.001;  // dilation after which nothing is drawn in again
+constexpr double kMostMore = 4.0;       // elements, for the jerk's variation in one
+constexpr double kTimeShare = 0.85;     // of the measure of the fine grid; the rest is w
+constexpr double kNearLimit = 0.9999;   // loads above it are drawn in
 constexpr double kDrawIn = 1.00005;
 constexpr double kInside = 1.002;
-constexpr double kMostChange = 0.4;     // of b between the first two controls of a moving end
-constexpr double kBlendShare = 0.15;    // of the extent: how far an end's value reaches at first
-constexpr double kRefineAbove = 1.005;  // dilation of an element from which on it is cut in two
-constexpr double kCoarseAbove = 0.03;   // over 1: in three
+constexpr double kMostChange = 0.4;   // of b between the first two controls of a moving end
+constexpr double kBlendShare = 0.15;  // of the extent: how far an end's value reaches at first
 
 double dilation_of(const FeedLoad& load) {
   return std::max({1.0, load.velocity, std::sqrt(load.acceleration), std::cbrt(load.jerk)});
 }
 
-/// Where the coarse law is at which time, mixed with w.
-GridMeasure time_measure(const FeedGrid& grid, const std::vector<double>& controls) {
+/// How much the jerk of one lane goes up and down inside element e at the law's speed, in shares of
+/// its limit: of the lane for which that is most.
+double jerk_variation(const FeedStretch& stretch, const FeedGrid& grid,
+                      const std::vector<double>& controls, std::size_t e) {
+  const std::size_t nodes = grid.rule.nodes.size(), width = static_cast<std::size_t>(grid.width);
+  const double size = grid.elements[e].end - grid.elements[e].begin;
+  std::array<double, kMaxFeedLanes> before{}, sum{};
+  for (std::size_t i = 0; i < nodes; ++i) {
+    const double b = cubic_values(grid, controls, e, grid.rule.nodes[i] * size)[0];
+    const double scale = b * std::sqrt(b);
+    const double* third = &grid.rows[3 * width * (e * nodes + i) + 2 * width];
+    for (std::size_t l = 0; l < width; ++l) {
+      const double now = third[l] * scale * stretch.lanes.jerk[l];
+      if (i > 0) sum[l] += std::abs(now - before[l]);
+      before[l] = now;
+    }
+  }
+  return *std::max_element(sum.begin(), sum.end());
+}
+
+/// Elements that a law wants up to each place: `count` by its time (mixed with w), and more where
+/// the path's own jerk goes up and down.
+GridMeasure element_measure(const FeedStretch& stretch, const FeedGrid& grid,
+                            const std::vector<double>& controls, double count) {
   GridMeasure measure;
   measure.w.push_back(0.0);
-  measure.value.push_back(0.0);
+  std::vector<double> time{0.0}, more{0.0};
   constexpr int kParts = 4;
   for (std::size_t e = 0; e < grid.elements.size(); ++e) {
     const FeedElement& element = grid.elements[e];
     const double size = (element.end - element.begin) / kParts;
+    const double variation = std::min(kMostMore, jerk_variation(stretch, grid, controls, e));
     for (int p = 0; p < kParts; ++p) {
       const double b = cubic_values(grid, controls, e, size * (p + 0.5))[0];
       measure.w.push_back(p + 1 == kParts ? element.end : element.begin + size * (p + 1));
-      measure.value.push_back(measure.value.back() + size / std::sqrt(b));
+      time.push_back(time.back() + size / std::sqrt(b));
+      more.push_back(more.back() + variation / kParts);
     }
   }
-  const double time = measure.value.back(), extent = measure.w.back();
-  for (std::size_t i = 0; i < measure.w.size(); ++i)
-    measure.value[i] =
-        kTimeShare * measure.value[i] + (1.0 - kTimeShare) * time * measure.w[i] / extent;
+  for (std::size_t i = 0; i < time.size(); ++i)
+    measure.value.push_back(count * (kTimeShare * time[i] / time.back() +
+                                     (1.0 - kTimeShare) * measure.w[i] / measure.w.back()) +
+                            more[i]);
   return measure;
 }
 
@@ -75,32 +104,27 @@ FeedProgram make_program(const FeedStretch& stretch, const FeedGrid& grid,
   return program;
 }
 
-/// Draws the rows of an element in by what its loads are beyond the lowered limits.
-void draw_in(FeedProgram& program, const std::vector<FeedLoad>& loads) {
+/// Draws the rows of an element in by what its loads are beyond the lowered limits; which ones.
+std::vector<bool> draw_in(FeedProgram& program, const std::vector<FeedLoad>& loads) {
   const std::size_t nodes = program.grid->rule.nodes.size();
+  std::vector<bool> changed(loads.size(), false);
   const auto more = [](double& factor, double load) {
     if (load > kNearLimit) factor *= kDrawIn * load;
   };
-  for (std::size_t e = 0; e < loads.size(); ++e)
+  for (std::size_t e = 0; e < loads.size(); ++e) {
+    changed[e] = loads[e].largest() > kNearLimit;
     for (std::size_t i = e * nodes; i < (e + 1) * nodes; ++i) {
       more(program.factors[i].velocity, loads[e].velocity);
       more(program.factors[i].acceleration, loads[e].acceleration);
       more(program.factors[i].jerk, loads[e].jerk);
     }
+  }
+  return changed;
 }
 
 std::vector<double> scaled(std::vector<double> values, double factor) {
   for (double& value : values) value *= factor;
   return values;
-}
-
-/// Start on a finer grid: a share of the old law, inside every row.
-std::vector<double> finer_start(const FeedProgram& program, std::vector<double> old) {
-  const double floor = 1e-7 * *std::max_element(old.begin(), old.end());
-  for (double& value : old) value = std::max(value, floor);
-  const FeedProgram::Factors ratios = point_ratios(program, old);
-  const double c = 1.0 / dilation_of({ratios.velocity, ratios.acceleration, ratios.jerk});
-  return scaled(std::move(old), kAgainShare * c * c);
 }
 
 std::vector<double> constant_controls(const FeedProgram& program, double share) {
@@ -172,9 +196,14 @@ StretchLaw solve_coarse(const FeedStretch& stretch, const MovingEnds& ends,
   shorten_ends(elements, ends);
   law.grid = feed_grid(stretch, std::move(elements), kCoarsePoints, false);
   FeedProgram program = make_program(stretch, law.grid, settings);
-  std::vector<double> start = blended_controls(program, ends);
-  fix_ends(program, ends, start);
-  FeedSolution solution = solve_feed(program, std::move(start), {1e-5, 80});
+  FeedSolution solution;
+  if (ends.start.moving || ends.end.moving) {
+    std::vector<double> start = blended_controls(program, ends);
+    fix_ends(program, ends, start);
+    solution = solve_feed(program, std::move(start), {1e-5, 80});
+  } else {
+    solution = solve_in_parts(program, {{kCoarseGap, 40}, false, false}).solution;
+  }
   law.controls = std::move(solution.controls);
   law.time = solution.time;
   law.converged = solution.converged;
@@ -185,62 +214,41 @@ StretchLaw solve_coarse(const FeedStretch& stretch, const MovingEnds& ends,
 /// Elements of the second grid.
 std::vector<FeedElement> fine_elements(const FeedStretch& stretch, const StretchLaw& coarse,
                                        const StretchSettings& settings) {
-  const int count =
-      std::max(settings.least_elements,
-               static_cast<int>(std::min(1e8, std::ceil(coarse.time / settings.element_time))));
-  return feed_elements(stretch, time_measure(coarse.grid, coarse.controls), count);
+  const double most = kMostFiner * static_cast<double>(coarse.grid.elements.size());
+  const double count = std::max(1.0 * settings.least_elements,
+                                std::min(most, std::ceil(coarse.time / settings.element_time)));
+  const GridMeasure measure = element_measure(stretch, coarse.grid, coarse.controls, count);
+  return feed_elements(stretch, measure, static_cast<int>(std::lround(measure.value.back())));
 }
 
-/// Takes another solve on the same grid when its certified time is shorter.
-bool take_better(const FeedStretch& stretch, StretchLaw& law, FeedSolution solution) {
+void take(const FeedStretch& stretch, const FeedSolution& solution, StretchLaw& law) {
   law.iterations += solution.iterations;
-  auto loads = element_loads(stretch, law.grid, solution.controls);
-  if (!(solution.time * dilation_of(largest_load(loads)) < law.time * law.dilation())) return false;
-  law.controls = std::move(solution.controls);
+  law.controls = solution.controls;
   law.time = solution.time;
-  law.converged = law.converged || solution.converged;
-  law.loads = std::move(loads);
-  return true;
+  law.converged = solution.converged;
+  law.loads = element_loads(stretch, law.grid, law.controls);
 }
 
-/// One more solve with the rows drawn in; false when it is no better.
-bool tighten(const FeedStretch& stretch, const StretchSettings& settings, StretchLaw& law) {
-  FeedProgram program = make_program(stretch, law.grid, settings);
-  draw_in(program, law.loads);
-  const double c = kInside * law.dilation();
-  return take_better(stretch, law, solve_feed(program, scaled(law.controls, 1.0 / (c * c)), {}));
-}
-
-/// One more solve with the elements that overshoot cut in parts; false when it is no better.
-bool refine(const FeedStretch& stretch, const StretchSettings& settings, StretchLaw& law) {
-  std::vector<FeedElement> elements;
-  for (std::size_t e = 0; e < law.loads.size(); ++e) {
-    const double over = dilation_of(law.loads[e]) - 1.0;
-    const int parts = over > kCoarseAbove ? 3 : over > kRefineAbove - 1.0 ? 2 : 1;
-    FeedElement element = law.grid.elements[e];
-    const double begin = element.begin, size = element.end - begin, end = element.end;
-    for (int p = 0; p < parts; ++p) {
-      element.begin = p == 0 ? begin : elements.back().end;
-      element.end = p + 1 == parts ? end : begin + size * (p + 1) / parts;
-      elements.push_back(element);
-    }
+/// Draws rows in where the law overshoots and solves again, a few times; keeps the best.
+void tighten(const FeedStretch& stretch, const StretchSettings& settings, FeedProgram& program,
+             FeedParts& parts, StretchLaw& law) {
+  FeedSolution best = parts.solution;
+  std::vector<FeedLoad> best_loads = law.loads;
+  double certified = law.time * law.dilation();
+  for (int n = 0; n < settings.tightenings; ++n) {
+    if (law.dilation() <= (n == 0 ? kDrawIn : kTightEnough)) break;
+    const std::vector<bool> changed = draw_in(program, law.loads);
+    solve_again(program, changed, kInside * law.dilation(), {{kLastGap}, true, false}, parts);
+    take(stretch, parts.solution, law);
+    if (law.time * law.dilation() >= certified) continue;
+    certified = law.time * law.dilation();
+    best = parts.solution;
+    best_loads = law.loads;
   }
-  StretchLaw finer;
-  finer.grid = feed_grid(stretch, std::move(elements), settings.points, true);
-  FeedProgram program = make_program(stretch, finer.grid, settings);
-  FeedSolution solution = solve_feed(
-      program,
-      finer_start(program, values_at(law.grid, law.controls, greville_places(finer.grid.elements))),
-      {});
-  finer.iterations = law.iterations + solution.iterations;
-  law.iterations = finer.iterations;
-  finer.controls = std::move(solution.controls);
-  finer.time = solution.time;
-  finer.converged = solution.converged;
-  finer.loads = element_loads(stretch, finer.grid, finer.controls);
-  if (!(finer.time * finer.dilation() < law.time * law.dilation())) return false;
-  law = std::move(finer);
-  return true;
+  law.controls = std::move(best.controls);
+  law.time = best.time;
+  law.converged = best.converged;
+  law.loads = std::move(best_loads);
 }
 
 }  // namespace
@@ -258,27 +266,16 @@ void dilate(StretchLaw& law, double c) {
 }
 
 StretchLaw solve_resting(const FeedStretch& stretch, const StretchSettings& settings) {
-  const StretchLaw coarse = solve_coarse(stretch, {}, settings);
   StretchLaw law;
-  law.iterations = coarse.iterations;
-  law.grid = feed_grid(stretch, fine_elements(stretch, coarse, settings), settings.points, true);
-  FeedProgram program = make_program(stretch, law.grid, settings);
-  const auto start = values_at(coarse.grid, coarse.controls, greville_places(law.grid.elements));
-  FeedSolution solution = solve_feed(program, finer_start(program, start), {});
-  law.iterations += solution.iterations;
-  if (!solution.converged) {
-    FeedSolution again = solve_feed(program, constant_controls(program, kFirstShare), {});
-    law.iterations += again.iterations;
-    if (again.converged || again.time < solution.time) solution = std::move(again);
+  {
+    const StretchLaw coarse = solve_coarse(stretch, {}, settings);
+    law.iterations = coarse.iterations;
+    law.grid = feed_grid(stretch, fine_elements(stretch, coarse, settings), settings.points, true);
   }
-  law.controls = std::move(solution.controls);
-  law.time = solution.time;
-  law.converged = solution.converged;
-  law.loads = element_loads(stretch, law.grid, law.controls);
-  for (int n = 0; n < settings.refinements && law.dilation() > kRefineAbove; ++n)
-    if (!refine(stretch, settings, law)) break;
-  for (int n = 0; n < settings.tightenings && law.dilation() > kDrawIn; ++n)
-    if (!tighten(stretch, settings, law)) break;
+  FeedProgram program = make_program(stretch, law.grid, settings);
+  FeedParts parts = solve_in_parts(program, {{kFineGap}});
+  take(stretch, parts.solution, law);
+  tighten(stretch, settings, program, parts, law);
   FeedProgram last = make_program(stretch, law.grid, settings);
   const double beta = constant_law(last);
   const double constant_time = stretch.map.extent() / std::sqrt(beta);

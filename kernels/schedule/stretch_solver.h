@@ -13,8 +13,7 @@ struct StretchSettings {
   double element_time = 0.007;  ///< s
   int least_elements = 40;
   int points = 5;       ///< Lobatto points an element
-  int refinements = 3;  ///< most solves with elements cut where they overshoot by 0.5 %
-  int tightenings = 1;  ///< most solves with the rows drawn in
+  int tightenings = 3;  ///< most solves with the rows drawn in
   double lower = 0.0;   ///< share by which all limits are lowered
   double slope = 0.0;   ///< share by which they sink further, linearly in s, to the end
 };
@@ -37,7 +36,8 @@ struct StretchLaw {
 /// Stretches all times by c: b ← b/c², loads by c, c², c³.
 void dilate(StretchLaw& law, double c);
 
-/// The best law from rest to rest found, before its dilation: two grid levels, tightening, and b =
+/// The best law from rest to rest found, before its dilation: two grid levels, both in parts
+/// (solve_in_parts), tightening, and b =
 /// const where that is faster or the optimiser fails. Always a law: some dilation makes it
 /// feasible.
 StretchLaw solve_resting(const FeedStretch& stretch, const StretchSettings& settings);

@@ -1,8 +1,12 @@
 #include "postproc/pipeline/feed_schedule.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <thread>
 
 #include "kernels/core/units.h"
 #include "kernels/schedule/constant_feed.h"
@@ -73,27 +77,71 @@ class Scheduler {
     }
     if (machine_.recipe.schedule == "programmed") refuse_overloads(out.stretches);
     if (machine_.recipe.schedule == "constant") lower_to_constant(out.stretches);
-    std::size_t done = 0;
-    for (ScheduledStretch& stretch : out.stretches) {
-      if (has_error(problems_)) break;
-      solve(stretch, out);
-      if (++done % 64 == 0 && !progress_("schedule", static_cast<double>(done) /
-                                                         static_cast<double>(out.stretches.size())))
-        return Result<FeedSchedule>::failure(
-            diagnostic("KN105", "cancelled while the feed was scheduled", in_.file_name));
-    }
     if (has_error(problems_)) return Result<FeedSchedule>::failure(std::move(problems_));
+    std::vector<Found> found(out.stretches.size());
+    if (!solve_all(out.stretches, found))
+      return Result<FeedSchedule>::failure(
+          diagnostic("KN105", "cancelled while the feed was scheduled", in_.file_name));
     out.peaks.assign(machine_.axes.size(), {});
-    for (const ScheduledStretch& stretch : out.stretches) {
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      problems_.insert(problems_.end(), found[k].problems.begin(), found[k].problems.end());
+      if (has_error(problems_)) return Result<FeedSchedule>::failure(std::move(problems_));
+      const ScheduledStretch& stretch = out.stretches[k];
       out.time += stretch.duration();
       if (stretch.joints.end != StopCause::path_end) ++out.stops;
-      see_peaks(stretch, out.peaks);
+      merge(found[k], out);
     }
     return Result<FeedSchedule>(std::move(out), std::move(problems_));
   }
 
  private:
-  void solve(ScheduledStretch& stretch, FeedSchedule& out) {
+  /// What one stretch gives to the whole.
+  struct Found {
+    Diagnostics problems;
+    std::vector<SlowedBy> slowed_by;
+    std::vector<JointPeaks> peaks;
+    double slowest_cut = kInfinity;
+    std::uint32_t slowest_cut_line = 0;
+  };
+
+  /// Every stretch by itself, on all threads. Only the caller's thread asks for progress. False:
+  /// cancelled.
+  bool solve_all(std::vector<ScheduledStretch>& stretches, std::vector<Found>& found) const {
+    const std::thread::id caller = std::this_thread::get_id();
+    std::atomic<std::size_t> done = 0;
+    std::atomic<bool> going = true;
+    const Progress look{[&](const char*, double) {
+      if (std::this_thread::get_id() == caller &&
+          !progress_("schedule",
+                     static_cast<double>(done.load()) / static_cast<double>(stretches.size())))
+        going = false;
+      return going.load();
+    }};
+    tbb::parallel_for(std::size_t{0}, stretches.size(), [&](std::size_t k) {
+      if (!look("schedule", 0.0)) return;
+      solve(stretches[k], found[k], look);
+      ++done;
+    });
+    return going;
+  }
+
+  static void merge(const Found& found, FeedSchedule& out) {
+    for (const SlowedBy& slow : found.slowed_by) add(out.slowed_by, slow);
+    for (std::size_t j = 0; j < found.peaks.size(); ++j) {
+      const JointPeaks& peak = found.peaks[j];
+      JointPeaks& most = out.peaks[j];
+      see(peak.velocity, peak.velocity_line, most.velocity, most.velocity_line);
+      see(peak.acceleration, peak.acceleration_line, most.acceleration, most.acceleration_line);
+      see(peak.jerk, peak.jerk_line, most.jerk, most.jerk_line);
+      most.jerk_square_integral += peak.jerk_square_integral;
+    }
+    if (found.slowest_cut < out.slowest_cut) {
+      out.slowest_cut = found.slowest_cut;
+      out.slowest_cut_line = found.slowest_cut_line;
+    }
+  }
+
+  void solve(ScheduledStretch& stretch, Found& found, const Progress& progress) const {
     if (!(stretch.joints.length() > 0.0)) return;
     std::vector<RateCap> caps;
     FeedResult result;
@@ -101,7 +149,7 @@ class Scheduler {
     settings.element_time = element_time_;
     settings.smooth_share = 1.0;  // joint_stretches() has looked at that
     for (int round = 0; round <= kBlockRounds; ++round) {
-      result = schedule_feed(feed_path(stretch.joints, caps), limits_, {}, {}, settings, progress_);
+      result = schedule_feed(feed_path(stretch.joints, caps), limits_, {}, {}, settings, progress);
       if (result.status != FeedStatus::solved && result.status != FeedStatus::constant_map) break;
       const std::vector<RateCap> more = short_blocks(stretch.joints, result.profile);
       if (more.empty() || round == kBlockRounds) break;
@@ -109,7 +157,7 @@ class Scheduler {
     }
     if (result.status == FeedStatus::empty) return;
     if (result.status != FeedStatus::solved && result.status != FeedStatus::constant_map) {
-      no_law(stretch.joints, result);
+      found.problems.push_back(no_law(stretch.joints, result));
       return;
     }
     stretch.profile = std::move(result.profile);
@@ -118,8 +166,11 @@ class Scheduler {
       if (moves(stretch.joints, i))
         stretch.slowing = std::max(stretch.slowing, machine_.cycle.min_block / time);
     }
-    tell_bindings(stretch, result, out);
-    see_cut_speed(stretch, out);
+    const std::array<double, 2> inside = between_ramps(stretch.profile);
+    tell_bindings(stretch, result, inside, found.slowed_by);
+    see_cut_speed(stretch, inside, found);
+    found.peaks.assign(machine_.axes.size(), {});
+    see_peaks(stretch, found.peaks);
   }
 
   // Sample i is not at the place of the one before it.
@@ -203,7 +254,7 @@ class Scheduler {
     return machine_.axes[static_cast<std::size_t>(joint)].name;
   }
 
-  void no_law(const JointStretch& stretch, const FeedResult& result) {
+  Diagnostic no_law(const JointStretch& stretch, const FeedResult& result) const {
     const FeedWitness& w = result.witness;
     std::string why;
     switch (result.status) {
@@ -220,8 +271,8 @@ class Scheduler {
       default:
         why = "no joint moves at a place where the path goes on";
     }
-    problems_.push_back(diagnostic("KN160", "there is no time law for the path here: " + why,
-                                   in_.file_name, static_cast<int>(line_at(stretch, w.s))));
+    return diagnostic("KN160", "there is no time law for the path here: " + why, in_.file_name,
+                      static_cast<int>(line_at(stretch, w.s)));
   }
 
   // --- constant and programmed ---------------------------------------------------------------
@@ -272,29 +323,29 @@ class Scheduler {
 
   // --- what was found --------------------------------------------------------------------------
 
-  void tell_bindings(const ScheduledStretch& stretch, const FeedResult& result, FeedSchedule& out) {
+  void tell_bindings(const ScheduledStretch& stretch, const FeedResult& result,
+                     const std::array<double, 2>& inside, std::vector<SlowedBy>& slowed_by) const {
     const JointStretch& joints = stretch.joints;
-    const std::array<double, 2> inside = between_ramps(stretch.profile);
     for (FeedBinding b : result.bindings) {
       b.from = std::max(b.from, inside[0]);
       b.to = std::min(b.to, inside[1]);
       if (b.joint < 0 || b.from >= b.to) continue;
       const double factor = least_share_of_feed(stretch, b);
       if (factor >= kFull) continue;
-      SlowedBy slow{b.joint,
-                    b.kind,
-                    line_at(joints, b.from),
-                    line_at(joints, b.to),
-                    factor,
-                    samples_[joints.first_sample + 1].segment};
-      SlowedBy* last = out.slowed_by.empty() ? nullptr : &out.slowed_by.back();
-      if (last && last->joint == slow.joint && last->limit == slow.limit &&
-          slow.first_line <= last->last_line + 1 && slow.first_line >= last->first_line) {
-        last->last_line = std::max(last->last_line, slow.last_line);
-        last->factor = std::min(last->factor, slow.factor);
-      } else {
-        out.slowed_by.push_back(slow);
-      }
+      add(slowed_by, {b.joint, b.kind, line_at(joints, b.from), line_at(joints, b.to), factor,
+                      samples_[joints.first_sample + 1].segment});
+    }
+  }
+
+  // At the end, or to the last one where that goes on.
+  static void add(std::vector<SlowedBy>& all, const SlowedBy& slow) {
+    SlowedBy* last = all.empty() ? nullptr : &all.back();
+    if (last && last->joint == slow.joint && last->limit == slow.limit &&
+        slow.first_line <= last->last_line + 1 && slow.first_line >= last->first_line) {
+      last->last_line = std::max(last->last_line, slow.last_line);
+      last->factor = std::min(last->factor, slow.factor);
+    } else {
+      all.push_back(slow);
     }
   }
 
@@ -319,10 +370,10 @@ class Scheduler {
     return inside;
   }
 
-  void see_cut_speed(const ScheduledStretch& stretch, FeedSchedule& out) const {
+  void see_cut_speed(const ScheduledStretch& stretch, const std::array<double, 2>& inside,
+                     Found& found) const {
     const JointStretch& joints = stretch.joints;
     if (std::find(joints.beam.begin(), joints.beam.end(), true) == joints.beam.end()) return;
-    const std::array<double, 2> inside = between_ramps(stretch.profile);
     const double from = stretch.profile.time(inside[0]), to = stretch.profile.time(inside[1]);
     const auto steps = static_cast<int>(std::clamp((to - from) / kPeakStep, 1.0, 1e6));
     for (int k = 0; k <= steps; ++k) {
@@ -330,9 +381,9 @@ class Scheduler {
       const std::size_t piece = joints.piece_at(state.s);
       const PathJet jet = joints.jet(piece, state.s);
       const double speed = jet.tip_first * state.first / stretch.slowing;
-      if (!joints.beam[piece] || jet.tip_first <= 0.0 || speed >= out.slowest_cut) continue;
-      out.slowest_cut = speed;
-      out.slowest_cut_line = joints.line[piece];
+      if (!joints.beam[piece] || jet.tip_first <= 0.0 || speed >= found.slowest_cut) continue;
+      found.slowest_cut = speed;
+      found.slowest_cut_line = joints.line[piece];
     }
   }
 

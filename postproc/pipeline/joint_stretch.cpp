@@ -17,6 +17,7 @@ constexpr double kNoExtent = 1e-12;                               // mm, of s
 constexpr double kSlowestRotaryFeed = 30.0 * kRadiansPerDegree;   // rad/s, turning without a feed
 constexpr double kVelocityJump = 1e-6, kAccelerationJump = 1e-3;  // of the limits
 constexpr double kSliver = 0.005;                                 // of both neighbours
+constexpr double kFinePart = 1.0 / 12.0;                          // of a piece
 constexpr double kJerkError = 1e-4;                               // of a joint's jerk
 constexpr double kFastest = 500.0;   // mm/s, of s, where no feed is programmed
 constexpr double kSamePlace = 1e-6;  // mm or rad, sample and function
@@ -295,14 +296,29 @@ class StretchBuilder {
           return false;
         }
       }
-      end_piece(place(shares[b]));
-      add_piece_data(leg_last_, rate_of(leg, extent));
+      end_pieces(sub, place(shares[b]), rate_of(leg, extent));
     }
     stop_if_rough(before, sub_before, leg_first_ - 1);
     const double shift = now_.length() - extent - start;  // of s, when a new stretch began
     for (std::size_t i = leg_first_; i <= leg_last_; ++i)
       now_.sample_s.push_back(start + shift + share_of(i) * extent);
     return true;
+  }
+
+  // Ends a piece at `at`, and further ones where `path` was halved often since its piece `sub`:
+  // there derivatives change within a fraction of it, which an element of the schedule would not
+  // see.
+  void end_pieces(std::size_t sub, double at, double rate) {
+    const ChebyshevPath& path = now_.path;
+    const double fine = kFinePart * (at - now_.length());
+    const auto size = [&](std::size_t i) { return path.to(i) - path.from(i); };
+    for (; sub < path.pieces(); ++sub) {
+      const bool last = sub + 1 == path.pieces();
+      if (!last && std::min(size(sub), size(sub + 1)) >= fine) continue;
+      now_.sub_end.push_back(static_cast<std::uint32_t>(sub + 1));
+      now_.breaks.push_back(last ? at : path.to(sub));
+      add_piece_data(leg_last_, rate);
+    }
   }
 
   void end_piece(double at) {
