@@ -16,6 +16,12 @@ constexpr LetterMask kCentreLetters = letter_bit('I') | letter_bit('J') | letter
 bool is_arc(GCode motion) { return motion == 20 || motion == 30; }
 bool is_whole(double value) { return std::abs(value - std::round(value)) <= 1e-4; }
 
+/// G10 L1, L10, L11.
+bool sets_tool_data(const BlockWords& block) {
+  if (block.code(GGroup::non_modal) != 100 || !block.has('L')) return false;
+  return block['L'] == 1.0 || block['L'] == 10.0 || block['L'] == 11.0;
+}
+
 }  // namespace
 
 AxisMask axis_mask(LetterMask letters) {
@@ -67,7 +73,10 @@ bool BlockPlanner::plan(const BlockWords& block, const ModalState& modal) {
   plan_.whole_comment = false;
   plan_.action_count = 0;
   plan_.axes = axis_mask(block.letters);
-  if ((block.letters & kAxisLetterMask & ~allowed_axes_) != 0) check_axes(block);
+  if ((block.letters & kAxisLetterMask & ~allowed_axes_) != 0 &&
+      block.code(GGroup::non_modal) != kMacroCall) {
+    check_axes(block);
+  }
   // What is wrong with its words was told already; what they would mean is a guess.
   if (block.bad) return false;
   if (dialect_ != InputDialect::linuxcnc) find_vector(block, modal);
@@ -87,7 +96,12 @@ bool BlockPlanner::plan(const BlockWords& block, const ModalState& modal) {
   LetterMask process =
       block.letters & ~kPlain & ~kCentreLetters & ~letter_bit('S') & ~letter_bit('T');
   process &= ~letters_of_g_codes(block);
+  process &= ~letters_of_flow(block);
   if (dialect_ != InputDialect::linuxcnc) process &= ~letters_of_dialect(block, modal);
+  if (block.has('R') && block.has_m(19) && block.code(GGroup::path_control) == 640) {
+    refuse("NC215", "R beside G64 and M19 may belong to either; write them on two lines",
+           at(block, 'R'));
+  }
   plan_process(block, process);
   if (good_) check_non_modal(block, modal);
   return good_;
@@ -126,10 +140,16 @@ void BlockPlanner::choose_motion(const BlockWords& block, const ModalState& moda
   const GCode mode1 = block.code(GGroup::motion);
   const bool covets = takes_axes(block);
   const bool by_value = block.code(GGroup::length_offset) == 431;
+  const bool fanuc = dialect_ == InputDialect::fanuc || dialect_ == InputDialect::haas;
   if (mode1 != kNoCode) {
-    if (mode1 == 800) {
+    if (mode1 == 800 && fanuc) {
+      // G80 ends a cycle there and leaves G0 or G1 as it was.
+      if (plan_.axes != 0 && !covets) plan_.motion = mode0 == 530 ? 0 : modal.base_motion;
+    } else if (mode1 == 800 || mode1 == kSplineEnd) {
       if (plan_.axes != 0 && !covets) {
-        refuse("NC210", "G80 ends motion, but axis words stand beside it; write G0 or G1 instead",
+        refuse("NC210",
+               g_code_text(mode1) +
+                   " ends motion, but axis words stand beside it; write G0 or G1 instead",
                at(block, GGroup::motion));
       }
     } else if (covets) {
@@ -162,10 +182,36 @@ LetterMask BlockPlanner::letters_of_g_codes(const BlockWords& block) const {
   LetterMask used = 0;
   const GCode mode0 = block.code(GGroup::non_modal);
   if (is_arc(plan_.motion)) used |= letter_bit('P') | letter_bit('R');
+  if (plan_.motion > 30) used |= letters_of_motion(block);
   if (mode0 == 40) used |= letter_bit('P');
   if (mode0 == 100) used |= letter_bit('L') | letter_bit('P') | letter_bit('R');
+  if (sets_tool_data(block)) used |= letter_bit('Q');
   if (block.code(GGroup::path_control) == 640) used |= letter_bit('P') | letter_bit('Q');
   if (block.code(GGroup::length_offset) == 430) used |= letter_bit('H');
+  return used & block.letters;
+}
+
+/// Words of cycles and splines. K of a cycle is the count of repeats in the Fanuc family.
+LetterMask BlockPlanner::letters_of_motion(const BlockWords& block) const {
+  if (plan_.motion == 52) return letter_bit('P') | letter_bit('L');
+  if (is_spline(plan_.motion)) return letter_bit('P') | letter_bit('Q');
+  LetterMask used = letter_bit('R') | letter_bit('L');
+  const GCode cycle = plan_.motion;
+  const bool fanuc = dialect_ != InputDialect::linuxcnc;
+  if (cycle == 730 || cycle == 830) used |= letter_bit('Q');
+  if (cycle == 740 || cycle == 820 || cycle == 840 || cycle == 860 || cycle == 890 || fanuc) {
+    used |= letter_bit('P');
+  }
+  return used & block.letters;
+}
+
+/// Words of M98 and its kin, and of G65, whose other letters are all arguments.
+LetterMask BlockPlanner::letters_of_flow(const BlockWords& block) const {
+  if (block.code(GGroup::non_modal) == kMacroCall) return block.letters;
+  LetterMask used = 0;
+  for (const int m : {97, 98, 99}) {
+    if (block.has_m(m) && is_flow_m(m, dialect_)) used |= letter_bit('P') | letter_bit('L');
+  }
   return used & block.letters;
 }
 
@@ -195,8 +241,14 @@ void BlockPlanner::check_values(const BlockWords& block) {
 
 void BlockPlanner::check_arc_words(const BlockWords& block) {
   if (!is_arc(plan_.motion)) {
+    LetterMask used = 0;
+    if (plan_.motion == 50 || plan_.motion == 51) used = letter_bit('I') | letter_bit('J');
+    if (plan_.motion == 870) used = kCentreLetters;
+    if (is_cycle(plan_.motion) && dialect_ == InputDialect::fanuc) used = letter_bit('K');
+    if (sets_tool_data(block)) used = letter_bit('I') | letter_bit('J');
+    if (block.code(GGroup::non_modal) == kMacroCall) used = kCentreLetters;
     for (const char letter : {'I', 'J', 'K'}) {
-      if (block.has(letter)) {
+      if (block.has(letter) && (used & letter_bit(letter)) == 0) {
         refuse("NC215",
                joined({"no code of this block uses the word ", std::string_view(&letter, 1),
                        "; remove it or write G2 or G3"}),
@@ -221,7 +273,9 @@ void BlockPlanner::check_arc_words(const BlockWords& block) {
 void BlockPlanner::check_non_modal(const BlockWords& block, const ModalState& modal) {
   const GCode code = block.code(GGroup::non_modal);
   const TextPlace place = at(block, GGroup::non_modal);
-  if (code == 40) {
+  if (code == kMacroCall && dialect_ != InputDialect::linuxcnc) {
+    check_macro_call(block);
+  } else if (code == 40) {
     check_dwell(block);
   } else if (code == 100) {
     if (dialect_ == InputDialect::linuxcnc || check_fanuc_g10(block)) check_g10(block);
@@ -236,9 +290,9 @@ void BlockPlanner::check_non_modal(const BlockWords& block, const ModalState& mo
 void BlockPlanner::check_g10(const BlockWords& block) {
   const TextPlace place = at(block, GGroup::non_modal);
   const double kind = block.has('L') ? block['L'] : -1.0;
+  if (sets_tool_data(block)) return check_tool_data(block);
   if (kind != 2.0 && kind != 20.0) {
-    refuse("NC218",
-           "G10 is read with L2 and L20 (work offsets) only; set tool data by --tool N=LENGTH",
+    refuse("NC218", "G10 is read with L1, L10, L11 (tool data), L2 and L20 (work offsets) only",
            place);
     return;
   }
@@ -249,6 +303,38 @@ void BlockPlanner::check_g10(const BlockWords& block) {
   }
   if (kind == 20.0 && block.has('R')) {
     refuse("NC218", "G10 L20 cannot set a rotation; write R with G10 L2", place);
+  }
+}
+
+/// G10 L1, L10, L11: tools are known by their length along the tool axis.
+void BlockPlanner::check_tool_data(const BlockWords& block) {
+  const TextPlace place = at(block, GGroup::non_modal);
+  if (settings_.plain_blocks) {
+    refuse("NC218", "G10 sets tool data, which a machine program does not", place);
+    return;
+  }
+  const double tool = block.has('P') ? block['P'] : 0.0;
+  if (!is_whole(tool) || tool < 0.5 || tool > 1e9) {
+    refuse("NC218", "G10 L1, L10 and L11 need P with the number of a tool, from 1", place);
+  }
+  constexpr AxisMask kZ = 4;
+  if ((plan_.axes & ~kZ) != 0) {
+    refuse(
+        "NC218",
+        "G10 L1, L10 and L11 are read with Z, R, I, J and Q: a tool is known by its length along "
+        "the tool axis; let the CAM post write without the other words",
+        place);
+  }
+  if (block.has('Q') && (!is_whole(block['Q']) || block['Q'] < -0.5 || block['Q'] > 9.5)) {
+    refuse("NC218", "G10: Q is the orientation of a lathe tool, 0 to 9", place);
+  }
+}
+
+/// G65: a number behind P, a count behind L; G, M, N, O and axis words of a motion have no place.
+void BlockPlanner::check_macro_call(const BlockWords& block) {
+  const TextPlace place = at(block, GGroup::non_modal);
+  if (block.code(GGroup::motion) != kNoCode || block.m_count != 0) {
+    refuse("NC256", "G65 and its arguments stand alone; write other codes on a line before", place);
   }
 }
 
@@ -279,6 +365,11 @@ void BlockPlanner::plan_m(const BlockWords& block, int slot, LetterMask& free) {
   const bool siemens = dialect_ == InputDialect::siemens;
   if (action.m == 2 || action.m == 30 || (siemens && action.m == 17)) {
     action.kind = ProcessAction::Kind::program_end;
+    return add_action(action);
+  }
+  if (is_flow_m(action.m, dialect_)) {
+    action.kind = ProcessAction::Kind::flow;
+    action.rank = action.m >= 97 ? kAfterMotion + 1 : 0;  // the last one of the block
     return add_action(action);
   }
   if (settings_.has_tcp && dialect_ == InputDialect::linuxcnc &&

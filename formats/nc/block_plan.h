@@ -11,7 +11,7 @@ namespace smoothpost::nc {
 
 /// What one M word or process letter of a block does.
 struct ProcessAction {
-  enum class Kind : std::uint8_t { event, comment, tcp_on, tcp_off, program_end };
+  enum class Kind : std::uint8_t { event, comment, tcp_on, tcp_off, program_end, flow };
   Kind kind = Kind::event;
   int rank = 0;  ///< order of execution on the line; 7: after the motion
   int m = -1;
@@ -24,7 +24,7 @@ struct ProcessAction {
 struct BlockPlan {
   static constexpr int kMaxActions = 12;
 
-  GCode motion = kNoCode;      ///< 0, 10, 20, 30; kNoCode: none
+  GCode motion = kNoCode;      ///< 0, 10, 20, 30, of a cycle or a spline; kNoCode: none
   AxisMask axes = 0;           ///< axis words of the block
   LetterMask vector = 0;       ///< words of the block that give the tool axis
   LetterMask taken = 0;        ///< letters that were handed to a comment and have no meaning here
@@ -58,6 +58,10 @@ class BlockPlanner {
   void check_machine_position(const BlockWords& block, const ModalState& modal);
   bool check_fanuc_g10(const BlockWords& block);
   LetterMask letters_of_g_codes(const BlockWords& block) const;
+  LetterMask letters_of_motion(const BlockWords& block) const;
+  LetterMask letters_of_flow(const BlockWords& block) const;
+  void check_macro_call(const BlockWords& block);
+  void check_tool_data(const BlockWords& block);
   LetterMask letters_of_dialect(const BlockWords& block, const ModalState& modal) const;
   void plan_process(const BlockWords& block, LetterMask free);
   void plan_m(const BlockWords& block, int slot, LetterMask& free);

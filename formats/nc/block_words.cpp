@@ -1,5 +1,6 @@
 #include "formats/nc/block_words.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "formats/nc/interpreter.h"
@@ -8,11 +9,12 @@
 namespace smoothpost::nc {
 
 const BlockWords& BlockReader::read(std::size_t index) {
-  const Block& block = program_.blocks[index];
+  const Block& block = program_->blocks[index];
   block_.line = static_cast<std::uint32_t>(index) + 1;
+  block_.input_line = input_line_ == 0 ? block_.line : input_line_;
   block_.letters = block_.absolute = block_.incremental = 0;
   block_.statements = 0;
-  block_.statement_piece = BlockWords::kNone;
+  block_.statement_piece = block_.flow_piece = BlockWords::kNone;
   block_.g.fill(kNoCode);
   block_.m_count = 0;
   block_.first_piece = block.first_piece;
@@ -21,7 +23,7 @@ const BlockWords& BlockReader::read(std::size_t index) {
   const std::uint32_t end = block.first_piece + block.piece_count;
   bool assigns = false;
   for (std::uint32_t i = block.first_piece; i < end; ++i) {
-    const Piece& piece = program_.pieces[i];
+    const Piece& piece = program_->pieces[i];
     switch (piece.kind) {
       case PieceKind::word:
         add_word(piece, i);
@@ -45,6 +47,10 @@ const BlockWords& BlockReader::read(std::size_t index) {
       case PieceKind::statement:
         add_statement(piece, i);
         break;
+      case PieceKind::flow:
+        block_.flow_piece = i;
+        block_.words = true;
+        break;
       case PieceKind::space:
       case PieceKind::line_end:
       case PieceKind::trailer:
@@ -55,11 +61,24 @@ const BlockWords& BlockReader::read(std::size_t index) {
   return block_;
 }
 
+/// The parser has kept what is wrong behind the end of the program for a subroutine that is called.
+bool BlockReader::tell_late_faults() {
+  const auto& faults = program_->late_faults;
+  auto fault =
+      std::lower_bound(faults.begin(), faults.end(), block_.line,
+                       [](const LateFault& f, std::uint32_t line) { return f.line < line; });
+  const bool any = fault != faults.end() && fault->line == block_.line;
+  for (; fault != faults.end() && fault->line == block_.line; ++fault) {
+    log_.error(fault->code, fault->text, {fault->line, fault->column});
+  }
+  return any;
+}
+
 /// The parser has named each of these; here only the first is told, so that nobody runs such a
 /// program.
 void BlockReader::add_construct(std::uint32_t index) {
   block_.bad = block_.words = true;
-  if (construct_told_) return;
+  if (tell_late_faults() || construct_told_) return;
   construct_told_ = true;
   refuse("NC200",
          "this line has text that could not be read: \"" + text(index) + "\"; mend what " +
@@ -120,7 +139,12 @@ void BlockReader::add_value(const Piece& piece, std::uint32_t index) {
 double BlockReader::in_increments(const Piece& piece, std::uint32_t index) {
   constexpr LetterMask kLengths = kAxisLetterMask | letter_bit('I') | letter_bit('J') |
                                   letter_bit('K') | letter_bit('R') | letter_bit('F');
-  if (piece.letter == 'G' || (letter_bit(piece.letter) & kLengths) == 0 || has_point(index)) {
+  if (piece.letter == 'G' || has_point(index)) return piece.value;
+  const GCode motion = block_.code(GGroup::motion);
+  const bool drills = is_cycle(motion) || (motion == kNoCode && values_.in_cycle());
+  // Of cycles K is a count and Q a length.
+  if (drills && piece.letter == 'K') return piece.value;
+  if (!(drills && piece.letter == 'Q') && (letter_bit(piece.letter) & kLengths) == 0) {
     return piece.value;
   }
   // R of G05.1 is a level.
@@ -129,7 +153,7 @@ double BlockReader::in_increments(const Piece& piece, std::uint32_t index) {
   const bool inch = unit == kNoCode ? values_.inch() : unit == 200;
   const bool feed = piece.letter == 'F';
   // A feed in whole millimetres per minute means the same on every Fanuc.
-  if (feed && !inch && program_.dialect == InputDialect::fanuc) return piece.value;
+  if (feed && !inch && program_->dialect == InputDialect::fanuc) return piece.value;
   const double increment = settings_.integer_increment.value_or(0.0);
   if (increment == 1.0) return piece.value;
   if (increment > 0.0 && !feed) {
@@ -177,7 +201,7 @@ void BlockReader::add_g(double value, std::uint32_t index) {
     return;
   }
   const auto code = static_cast<GCode>(nearest);
-  const GCodeInfo& info = g_code_info(code, program_.dialect);
+  const GCodeInfo& info = g_code_info(code, program_->dialect);
   if (!is_g_allowed(info, code, index)) return;
   const auto group = static_cast<std::size_t>(info.group);
   // G80 beside another motion code has no effect.
@@ -202,7 +226,7 @@ void BlockReader::add_g(double value, std::uint32_t index) {
 /// A code that is refused still stands for its group, so that the messages of the block fit.
 bool BlockReader::is_g_allowed(const GCodeInfo& info, GCode code, std::uint32_t index) {
   if (info.status == GStatus::tcp) {
-    const bool linuxcnc = program_.dialect == InputDialect::linuxcnc;
+    const bool linuxcnc = program_->dialect == InputDialect::linuxcnc;
     refuse("NC203",
            g_code_text(code) + " (" + info.name +
                (linuxcnc ? ") is a mode of another control: name it by --input-dialect, or post "
@@ -215,6 +239,17 @@ bool BlockReader::is_g_allowed(const GCodeInfo& info, GCode code, std::uint32_t 
            g_code_text(code) + " (" + info.name +
                ") is not read in this version; let the CAM post write straight moves and "
                "arcs (G1, G2, G3) without it",
+           index);
+  } else if (info.status == GStatus::synchronised) {
+    refuse("NC202",
+           g_code_text(code) + " (" + info.name +
+               ") ties the feed to the turning of the spindle, which the planned motion does not "
+               "follow; let the CAM post write G94 feeds, or keep this operation on its control",
+           index);
+  } else if (info.status == GStatus::expanded && settings_.plain_blocks) {
+    refuse("NC202",
+           g_code_text(code) + " (" + info.name +
+               ") stands for motions that a machine program writes out; write them",
            index);
   } else if (info.status == GStatus::unknown) {
     refuse("NC201", g_code_text(code) + " is no G code of this language", index);
@@ -230,7 +265,7 @@ void BlockReader::add_m(double value, std::uint32_t index) {
     return;
   }
   const auto m = static_cast<std::int16_t>(nearest);
-  if (const char* why = m_refusal(m, program_.dialect)) {
+  if (const char* why = m_refusal(m, program_->dialect, settings_.plain_blocks)) {
     refuse("NC226", "M" + std::to_string(m) + ": " + why + "; let the CAM post write without it",
            index);
     return;
@@ -238,7 +273,7 @@ void BlockReader::add_m(double value, std::uint32_t index) {
   for (int i = 0; i < block_.m_count; ++i) {
     const int other = block_.m[static_cast<std::size_t>(i)];
     const bool grouped = m_group(m) >= 0 && m_group(m) == m_group(other) && m_group(m) != 10;
-    if (other == m || (grouped && program_.dialect != InputDialect::siemens)) {
+    if (other == m || (grouped && program_->dialect != InputDialect::siemens)) {
       refuse("NC207",
              "M" + std::to_string(other) + " and M" + std::to_string(m) +
                  " are of one modal group; write them on two lines",
@@ -262,14 +297,15 @@ void BlockReader::refuse(const char* code, std::string message, std::uint32_t pi
 
 TextPlace BlockReader::place(const BlockWords& block, std::uint32_t piece) const {
   if (piece == BlockWords::kNone) return {block.line, 1};
-  return {block.line, program_.pieces[piece].begin - program_.pieces[block.first_piece].begin + 1};
+  return {block.line,
+          program_->pieces[piece].begin - program_->pieces[block.first_piece].begin + 1};
 }
 
 std::string BlockReader::text(std::uint32_t index) const {
-  const Piece& piece = program_.pieces[index];
+  const Piece& piece = program_->pieces[index];
   std::string out;
   for (std::uint32_t i = piece.begin; i < piece.begin + piece.length && out.size() < 60; ++i) {
-    const char c = program_.text[i];
+    const char c = program_->text[i];
     if (c == ' ' || c == '\t') continue;
     const bool lower = piece.kind == PieceKind::word &&
                        piece.detail != static_cast<std::uint8_t>(WordForm::name) && c >= 'a' &&

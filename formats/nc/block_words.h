@@ -13,6 +13,7 @@
 namespace smoothpost::nc {
 
 struct InterpreterSettings;
+class ParameterStore;
 
 /// A set of word letters: bit 0 is A, bit 25 is Z, then the addresses of more than one letter.
 using LetterMask = std::uint32_t;
@@ -35,10 +36,11 @@ inline constexpr LetterMask kAxisLetterMask = letter_bit('X') | letter_bit('Y') 
 struct BlockWords {
   static constexpr int kMaxM = 4;
 
-  std::uint32_t line = 0;
-  LetterMask letters = 0;      ///< all but G, M, N, O
-  LetterMask absolute = 0;     ///< words with AC()
-  LetterMask incremental = 0;  ///< words with IC()
+  std::uint32_t line = 0;        ///< of the text that the block stands in
+  std::uint32_t input_line = 0;  ///< the same, but for the file of a subroutine: that of its call
+  LetterMask letters = 0;        ///< all but G, M, N, O
+  LetterMask absolute = 0;       ///< words with AC()
+  LetterMask incremental = 0;    ///< words with IC()
   std::array<double, kAddresses> value;
   std::array<std::uint32_t, kAddresses> piece;
   std::array<GCode, kGGroups> g;
@@ -53,6 +55,7 @@ struct BlockWords {
   bool percent = false;
   bool words = false;                     ///< any word at all
   std::uint32_t statements = 0;           ///< bit i: the block has the SiemensWord i
+  std::uint32_t flow_piece = kNone;       ///< the block is a line of program flow
   std::uint32_t statement_piece = kNone;  ///< the last one but those without effect
 
   static constexpr std::uint32_t kNone = 0xffffffff;
@@ -86,6 +89,12 @@ class WordValues {
   virtual void finish_block(bool good) = 0;
   /// G20 is active.
   virtual bool inch() const = 0;
+  /// A canned cycle is active.
+  virtual bool in_cycle() const { return false; }
+  /// The value at the start of `text`, of a line of program flow.
+  virtual Evaluated value(std::string_view) { return {}; }
+  /// The parameters; nullptr: the dialect has no calls.
+  virtual ParameterStore* store() { return nullptr; }
 };
 
 /// Sorts the pieces of blocks into BlockWords and refuses what no block may hold: unknown and
@@ -95,24 +104,36 @@ class BlockReader {
  public:
   BlockReader(const Program& program, const InterpreterSettings& settings, WordValues& values,
               DiagnosticLog& log)
-      : program_(program),
+      : program_(&program),
         settings_(settings),
         values_(values),
         log_(log),
         checks_points_(program.dialect == InputDialect::fanuc ||
                        program.dialect == InputDialect::haas) {}
 
+  /// Blocks are those of `program` from now on. `input_line` 0: their lines are those of the input;
+  /// else all of them count as that line of it.
+  void select(const Program& program, std::uint32_t input_line) {
+    program_ = &program;
+    input_line_ = input_line;
+  }
+  const Program& program() const { return *program_; }
+
   /// @pre index < program.blocks.size(). Valid until the next call.
   const BlockWords& read(std::size_t index);
 
-  InputDialect dialect() const { return program_.dialect; }
+  InputDialect dialect() const { return program_->dialect; }
+  /// Where a piece stands in the input: in the file of a subroutine the line of its call.
+  TextPlace input_place(const BlockWords& block, std::uint32_t piece) const {
+    return input_line_ == 0 ? place(block, piece) : TextPlace{input_line_, 1};
+  }
   TextPlace place(const BlockWords& block, std::uint32_t piece) const;
   /// The word as written, upper case, without blanks.
   std::string text(std::uint32_t piece) const;
   /// The text of a piece, as written.
   std::string_view raw(std::uint32_t piece) const {
-    const Piece& p = program_.pieces[piece];
-    return std::string_view(program_.text).substr(p.begin, p.length);
+    const Piece& p = program_->pieces[piece];
+    return std::string_view(program_->text).substr(p.begin, p.length);
   }
   /// Whether a word of the Fanuc family has a decimal point.
   bool has_point(std::uint32_t piece) const {
@@ -121,6 +142,7 @@ class BlockReader {
 
  private:
   void add_construct(std::uint32_t index);
+  bool tell_late_faults();
   void add_word(const Piece& piece, std::uint32_t index);
   void add_value(const Piece& piece, std::uint32_t index);
   void put(const Piece& piece, std::uint32_t index, double value);
@@ -132,7 +154,8 @@ class BlockReader {
   void add_m(double value, std::uint32_t index);
   void refuse(const char* code, std::string text, std::uint32_t piece);
 
-  const Program& program_;
+  const Program* program_;
+  std::uint32_t input_line_ = 0;
   const InterpreterSettings& settings_;
   WordValues& values_;
   DiagnosticLog& log_;

@@ -14,7 +14,9 @@ struct Row {
 };
 
 constexpr auto kRead = GStatus::read;
+constexpr auto kExpanded = GStatus::expanded;
 constexpr auto kLater = GStatus::later;
+constexpr auto kSynchronised = GStatus::synchronised;
 constexpr auto kTcp = GStatus::tcp;
 
 constexpr Row kRows[] = {
@@ -23,10 +25,10 @@ constexpr Row kRows[] = {
     {20, GGroup::motion, kRead, "clockwise arc"},
     {30, GGroup::motion, kRead, "counter-clockwise arc"},
     {40, GGroup::non_modal, kRead, "dwell"},
-    {50, GGroup::motion, kLater, "cubic spline"},
-    {51, GGroup::motion, kLater, "quadratic spline (on a Fanuc: look-ahead control)"},
-    {52, GGroup::motion, kLater, "NURBS"},
-    {53, GGroup::non_modal, kLater, "end of NURBS"},
+    {50, GGroup::motion, kExpanded, "cubic spline"},
+    {51, GGroup::motion, kExpanded, "quadratic spline"},
+    {52, GGroup::motion, kExpanded, "NURBS"},
+    {53, GGroup::motion, kExpanded, "end of NURBS"},
     {70, GGroup::lathe_diameter, kLater, "lathe diameter mode"},
     {80, GGroup::lathe_diameter, kLater, "lathe radius mode"},
     {100, GGroup::non_modal, kRead, "setting of offsets"},
@@ -42,8 +44,8 @@ constexpr Row kRows[] = {
     {281, GGroup::non_modal, kRead, "storing of the home position"},
     {300, GGroup::non_modal, kRead, "second home position"},
     {301, GGroup::non_modal, kRead, "storing of the second home position"},
-    {330, GGroup::motion, kLater, "spindle-synchronised motion"},
-    {331, GGroup::motion, kLater, "rigid tapping"},
+    {330, GGroup::motion, kSynchronised, "spindle-synchronised motion"},
+    {331, GGroup::motion, kSynchronised, "rigid tapping"},
     {382, GGroup::motion, kLater, "probing"},
     {383, GGroup::motion, kLater, "probing"},
     {384, GGroup::motion, kLater, "probing"},
@@ -79,19 +81,19 @@ constexpr Row kRows[] = {
     {682, GGroup::non_modal, kTcp, "tilted work plane"},
     {683, GGroup::non_modal, kTcp, "tilted work plane by tool axis"},
     {690, GGroup::non_modal, kLater, "end of coordinate rotation or tilted work plane"},
-    {730, GGroup::motion, kLater, "canned cycle"},
-    {740, GGroup::motion, kLater, "canned cycle"},
-    {760, GGroup::motion, kLater, "threading cycle"},
+    {730, GGroup::motion, kExpanded, "chip-breaking drilling cycle"},
+    {740, GGroup::motion, kExpanded, "left-hand tapping cycle"},
+    {760, GGroup::motion, kSynchronised, "threading cycle"},
     {800, GGroup::motion, kRead, "end of motion mode"},
-    {810, GGroup::motion, kLater, "canned cycle"},
-    {820, GGroup::motion, kLater, "canned cycle"},
-    {830, GGroup::motion, kLater, "canned cycle"},
-    {840, GGroup::motion, kLater, "canned cycle"},
-    {850, GGroup::motion, kLater, "canned cycle"},
-    {860, GGroup::motion, kLater, "canned cycle"},
-    {870, GGroup::motion, kLater, "canned cycle"},
-    {880, GGroup::motion, kLater, "canned cycle"},
-    {890, GGroup::motion, kLater, "canned cycle"},
+    {810, GGroup::motion, kExpanded, "drilling cycle"},
+    {820, GGroup::motion, kExpanded, "drilling cycle with dwell"},
+    {830, GGroup::motion, kExpanded, "peck drilling cycle"},
+    {840, GGroup::motion, kExpanded, "tapping cycle"},
+    {850, GGroup::motion, kExpanded, "boring cycle"},
+    {860, GGroup::motion, kExpanded, "boring cycle with spindle stop"},
+    {870, GGroup::motion, kExpanded, "back boring cycle"},
+    {880, GGroup::motion, kLater, "boring cycle with a retract by hand"},
+    {890, GGroup::motion, kExpanded, "boring cycle with dwell"},
     {900, GGroup::distance, kRead, "absolute words"},
     {901, GGroup::arc_distance, kRead, "absolute arc centres"},
     {910, GGroup::distance, kRead, "incremental words"},
@@ -102,7 +104,7 @@ constexpr Row kRows[] = {
     {923, GGroup::non_modal, kRead, "stored shift"},
     {930, GGroup::feed_mode, kRead, "inverse time feed"},
     {940, GGroup::feed_mode, kRead, "feed by the minute"},
-    {950, GGroup::feed_mode, kLater, "feed by the turn"},
+    {950, GGroup::feed_mode, kSynchronised, "feed by the turn"},
     {960, GGroup::spindle_mode, kLater, "constant surface speed"},
     {970, GGroup::spindle_mode, kRead, "spindle speed"},
     {980, GGroup::retract, kRead, "retract to the old height"},
@@ -118,6 +120,8 @@ constexpr Row kRows[] = {
 constexpr Row kFanucRows[] = {
     {50, GGroup::no_effect, kRead, "high-speed mode"},
     {51, GGroup::no_effect, kRead, "contour control"},
+    {52, GGroup::motion, kLater, "NURBS"},
+    {53, GGroup::motion, kLater, "end of NURBS"},
     {71, GGroup::non_modal, kLater, "cylindrical interpolation"},
     {80, GGroup::no_effect, kRead, "look-ahead control"},
     {90, GGroup::no_effect, kRead, "exact stop in the block"},
@@ -136,11 +140,12 @@ constexpr Row kFanucRows[] = {
     {600, GGroup::non_modal, kLater, "positioning from one side"},
     {620, GGroup::no_effect, kRead, "corner override"},
     {630, GGroup::no_effect, kRead, "tapping mode"},
-    {650, GGroup::non_modal, kLater, "macro call"},
+    {650, GGroup::non_modal, kExpanded, "macro call"},
     {660, GGroup::non_modal, kLater, "modal macro call"},
     {670, GGroup::no_effect, kRead, "end of modal macro call"},
     {690, GGroup::no_effect, kRead, "end of rotation"},
-    {800, GGroup::no_effect, kRead, "end of cycle"},
+    {760, GGroup::motion, kLater, "fine boring cycle"},
+    {870, GGroup::motion, kLater, "back boring cycle"},
     {921, GGroup::non_modal, kLater, "preset of the work system"},
 };
 
@@ -270,16 +275,24 @@ int m_rank(int m) {
   return group < 4 ? 5 : kOrder[group - 4];
 }
 
-const char* m_refusal(int m, InputDialect dialect) {
+const char* m_refusal(int m, InputDialect dialect, bool plain) {
   if (dialect == InputDialect::siemens) return nullptr;
-  if (dialect != InputDialect::linuxcnc) {
-    const bool call = m == 96 || m == 97 || m == 98 || m == 99 || m == 198;
-    return call ? "a subroutine call or return is read in a later version" : nullptr;
+  if (plain && is_flow_m(m, dialect)) {
+    return "a machine program runs its blocks one after the other; write the blocks out";
   }
-  if (m == 98 || m == 99) return "a subroutine call or return is read in a later version";
+  if (dialect != InputDialect::linuxcnc) {
+    const bool other = m == 96 || (m == 97 && dialect != InputDialect::haas) || m == 198;
+    return other ? "a call of another memory or an interrupt is not read; write M98" : nullptr;
+  }
   if (m == 61) return "setting the tool number without a change is read in a later version";
-  if (m >= 70 && m <= 73) return "saving and restoring modal state is read in a later version";
   return nullptr;
+}
+
+bool is_flow_m(int m, InputDialect dialect) {
+  if (dialect == InputDialect::siemens) return false;
+  if (m == 98 || m == 99) return true;
+  if (m == 97) return dialect == InputDialect::haas;
+  return m >= 70 && m <= 73 && dialect == InputDialect::linuxcnc;
 }
 
 }  // namespace smoothpost::nc

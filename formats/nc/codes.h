@@ -11,6 +11,12 @@ namespace smoothpost::nc {
 using GCode = std::int16_t;
 inline constexpr GCode kNoCode = -1;
 
+inline constexpr GCode kSplineEnd = 53;   ///< G5.3
+inline constexpr GCode kMacroCall = 650;  ///< G65 of the Fanuc family
+
+/// Rank of m_rank() for what acts after the motion of its line.
+inline constexpr int kAfterMotion = 7;
+
 /// Modal groups of RS274NGC as LinuxCNC numbers them; of two words of one group one is wrong.
 enum class GGroup : std::uint8_t {
   non_modal = 0,
@@ -32,10 +38,12 @@ enum class GGroup : std::uint8_t {
 inline constexpr int kGGroups = 16;
 
 enum class GStatus : std::uint8_t {
-  unknown,  ///< no code of this language
-  read,     ///< has its meaning here
-  later,    ///< a code of this language that a later version reads
-  tcp       ///< tool-centre-point or tilted-plane mode of another controller
+  unknown,       ///< no code of this language
+  read,          ///< has its meaning here
+  expanded,      ///< read as the motions that it stands for: cycles, splines; macro calls
+  later,         ///< a code of this language that a later version reads
+  synchronised,  ///< feed by the turning of the spindle
+  tcp            ///< tool-centre-point or tilted-plane mode of another controller
 };
 
 struct GCodeInfo {
@@ -58,8 +66,18 @@ int m_group(int m);
 /// user.
 int m_rank(int m);
 
-/// Why an M word can never be handed on as an event or a comment (program flow, saved state);
-/// nullptr when it can.
-const char* m_refusal(int m, InputDialect dialect);
+/// Why an M word is never read; nullptr when it is.
+/// @param plain  a machine program, whose blocks run one after the other
+const char* m_refusal(int m, InputDialect dialect, bool plain);
+
+/// M70 to M73, M98, M99 (haas: M97): words of the program's flow and of its saved state.
+bool is_flow_m(int m, InputDialect dialect);
+
+/// G73, G74, G81 to G89.
+inline bool is_cycle(GCode code) {
+  return code == 730 || code == 740 || (code >= 810 && code <= 890);
+}
+/// G5, G5.1, G5.2.
+inline bool is_spline(GCode code) { return code >= 50 && code <= 52; }
 
 }  // namespace smoothpost::nc

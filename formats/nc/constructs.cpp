@@ -144,10 +144,8 @@ constexpr std::array<ConstructText, 19> kTexts = {{
     {"NC120", "an expression or function stands where none is read",
      "write a letter before it, or let the CAM post write plain numbers"},
     {"NC121", "a parameter (#) is not read here", "let the CAM post write plain numbers"},
-    {"NC122",
-     "an O word other than a program number alone on its line (subroutine, loop, branch) "
-     "is not read in this version",
-     "let the CAM post write the moves out, without subroutines and loops"},
+    {"NC122", "an O word behind other words of its line, or one of LinuxCNC in another dialect",
+     "write it on a line of its own, or name the program's control by --input-dialect"},
     {"NC123", "quoted text is not read in this version", "write it as a ( comment )"},
     {"NC124", "an assignment or address with = is not read in this version",
      "let the CAM post write words such as X1.5, or name the program's control by --input-dialect"},

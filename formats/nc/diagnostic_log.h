@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "kernels/core/diagnostic.h"
 
@@ -14,13 +15,17 @@ struct TextPlace {
   std::uint32_t column = 0;
 };
 
-/// Collects diagnostics of one file; of each severity the first kLimit are kept, the others
-/// counted.
+/// Collects diagnostics of one program and the files of its subroutines; of each severity the first
+/// kLimit are kept, the others counted. One that is told again for the same place is dropped: loops
+/// come to a fault again and again.
 class DiagnosticLog {
  public:
   static constexpr std::size_t kLimit = 100;
 
-  explicit DiagnosticLog(std::string file) : file_(std::move(file)) {}
+  explicit DiagnosticLog(std::string file) : files_{std::move(file)} {}
+
+  /// Following places are in `file`.
+  void enter_file(const std::string& file);
 
   void error(const char* code, std::string text, TextPlace place) {
     add(Severity::error, code, std::move(text), place);
@@ -31,17 +36,26 @@ class DiagnosticLog {
   void note(const char* code, std::string text, TextPlace place) {
     add(Severity::note, code, std::move(text), place);
   }
+  /// A diagnostic of another reader, with its own file.
+  void adopt(const Diagnostic& diagnostic);
   bool has_error() const { return counts_[static_cast<std::size_t>(Severity::error)] > 0; }
   std::size_t errors() const { return counts_[static_cast<std::size_t>(Severity::error)]; }
 
-  /// The diagnostics in order of the file; when some were left out a closing note gives the counts.
+  /// The diagnostics in order of the file, those of the program first; when some were left out a
+  /// closing note gives the counts.
   Diagnostics take();
 
  private:
   void add(Severity severity, const char* code, std::string text, TextPlace place);
 
-  std::string file_;
-  Diagnostics list_;
+  struct Entry {
+    Diagnostic diagnostic;
+    std::size_t file = 0;
+  };
+
+  std::vector<std::string> files_;  ///< in the order of entering
+  std::size_t file_ = 0;
+  std::vector<Entry> list_;
   std::size_t counts_[3] = {0, 0, 0};
 };
 

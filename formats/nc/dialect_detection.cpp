@@ -69,6 +69,15 @@ bool is_linuxcnc(std::string_view line, std::string_view words) {
   return false;
 }
 
+/// Statements of custom macro B.
+bool is_macro(std::string_view words) {
+  if (words.starts_with("IF[") || words.starts_with("WHILE[")) return true;
+  if (words.starts_with("GOTO") && words.size() > 4) {
+    return detail::is_digit(words[4]) || words[4] == '#' || words[4] == '[';
+  }
+  return words.starts_with("G65P");
+}
+
 bool is_siemens(std::string_view line, std::string_view words) {
   if (line.starts_with("%_N_") || line.starts_with("MSG(\"") || line.starts_with("DEFREAL")) {
     return true;
@@ -96,7 +105,7 @@ std::vector<InputDialect> fitting_dialects(std::string_view text) {
     linuxcnc = linuxcnc || is_linuxcnc(line, words);
     siemens = siemens || is_siemens(line, words);
     haas = haas || has_word(words, "G234") || has_word(words, "G187");
-    fanuc = fanuc || has_word(words, "G43.4") || has_word(words, "G43.5") ||
+    fanuc = fanuc || is_macro(words) || has_word(words, "G43.4") || has_word(words, "G43.5") ||
             has_word(words, "G05.1") || has(words, "G5.1Q");
   }
   std::vector<InputDialect> out;

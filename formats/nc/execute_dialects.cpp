@@ -49,8 +49,8 @@ void Executor::warn_dialect(const BlockWords& block) {
 /// What the statements of a Sinumerik block do before its motion.
 void Executor::statements(const BlockWords& block) {
   if (block.says(SiemensWord::message)) {
-    message(message_text(reader_.raw(block.statement_piece)), block.line,
-            reader_.place(block, block.statement_piece).column);
+    message(message_text(reader_.raw(block.statement_piece)), block.input_line,
+            reader_.input_place(block, block.statement_piece).column);
   }
   if (block.says(SiemensWord::cycle832)) {
     warn_once(kWarnCycle832,
@@ -72,7 +72,7 @@ void Executor::statements(const BlockWords& block) {
   if (block.says(SiemensWord::traori)) set_tcp(true);
   if (block.says(SiemensWord::trafoof)) set_tcp(false);
   if (block.says(SiemensWord::program_end)) {
-    sink_.program_end(block.line);
+    sink_.program_end(block.input_line);
     summary_.ended = true;
   }
   change_frame(block);
@@ -136,13 +136,13 @@ void Executor::change_tool(const BlockWords& block) {
 
 /// D0: no length; any other edge: the length of the tool, when it was given.
 void Executor::tool_edge(const BlockWords& block) {
-  if (block.has('D') && block['D'] == 0.0) return set_tool_length(0.0, 0, block.line);
+  if (block.has('D') && block['D'] == 0.0) return set_tool_length(0.0, 0, block.input_line);
   const bool changed = modal_.tool_changed;
   const int tool = changed ? modal_.spindle_tool : modal_.words.tool;
   const std::string& name = changed ? modal_.spindle_tool_name : modal_.words.tool_name;
   const auto found = settings_.tool_lengths.find(tool);
   if (name.empty() && found != settings_.tool_lengths.end()) {
-    return set_tool_length(found->second, tool, block.line);
+    return set_tool_length(found->second, tool, block.input_line);
   }
   const std::uint32_t piece = block.has('D') ? block.piece[letter_index('D')] : block.first_piece;
   if (tool != 0 || !name.empty()) {
@@ -152,7 +152,7 @@ void Executor::tool_edge(const BlockWords& block) {
                   "length 0 (first of such tools); give lengths by --tool N=LENGTH (mm)",
               block, piece);
   }
-  set_tool_length(0.0, tool, block.line);
+  set_tool_length(0.0, tool, block.input_line);
 }
 
 /// The tool-centre-point modes of the Fanuc family are tool length offsets.

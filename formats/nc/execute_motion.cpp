@@ -4,6 +4,7 @@
 #include "formats/nc/arc.h"
 #include "formats/nc/executor.h"
 #include "formats/nc/number_text.h"
+#include "formats/nc/plane.h"
 #include "kernels/core/units.h"
 
 namespace smoothpost::nc {
@@ -25,23 +26,6 @@ double length(const AxisWords& start, const AxisWords& end, std::size_t first) {
   const double b = end[first + 1] - start[first + 1];
   const double c = end[first + 2] - start[first + 2];
   return std::sqrt(a * a + b * b + c * c);
-}
-
-/// Axes of a plane: first, second, and the one along its normal.
-struct PlaneAxes {
-  std::size_t first;
-  std::size_t second;
-  std::size_t third;
-  char first_centre;
-  char second_centre;
-  char wrong_centre;
-  const char* name;
-};
-
-PlaneAxes plane_axes(GCode plane) {
-  if (plane == 180) return {2, 0, 1, 'K', 'I', 'J', "G18 (ZX)"};
-  if (plane == 190) return {1, 2, 0, 'J', 'K', 'I', "G19 (YZ)"};
-  return {0, 1, 2, 'I', 'J', 'K', "G17 (XY)"};
 }
 
 AxisMask bit(std::size_t axis) { return static_cast<AxisMask>(1u << axis); }
@@ -106,10 +90,10 @@ void Executor::begin_motion(const BlockWords& block, const BlockPlan& plan) {
   motion_.machine_position = false;
   motion_.unknown_start = coordinates_.unknown();
   motion_.programmed = plan.axes;
-  motion_.line = block.line;
+  motion_.line = block.input_line;
   motion_.duration = 0.0;
   motion_.start = coordinates_.world();
-  motion_.column = reader_.place(block, block.first_piece).column;
+  motion_.column = reader_.input_place(block, block.first_piece).column;
   motion_.axis_vector = false;
   summary_.uses_tcp = summary_.uses_tcp || modal_.tcp;
   summary_.uses_rotary = summary_.uses_rotary || (plan.axes & kRotaryAxes) != 0;
@@ -156,9 +140,25 @@ bool Executor::feed_given(const BlockWords& block, const BlockPlan& plan) {
   return false;
 }
 
+void Executor::change_mode(GCode mode, const BlockWords& block) {
+  if (!control_points_.empty() && mode != 52) end_spline(block, mode == kSplineEnd);
+  const bool fanuc = !is_linuxcnc() && !is_siemens();
+  if (mode == kSplineEnd) mode = 800;
+  modal_.motion = mode == 800 && fanuc ? modal_.base_motion : mode;
+  if (mode >= 0 && mode <= 30) modal_.base_motion = mode;
+}
+
+/// A motion that stands for several.
+void Executor::expanded_motion(const BlockWords& block, const BlockPlan& plan, GCode before) {
+  if (is_cycle(plan.motion)) return cycle(block, plan, before);
+  if (is_spline(plan.motion)) spline(block, plan, before);
+}
+
 void Executor::motion(const BlockWords& block, const BlockPlan& plan) {
   const GCode mode = block.code(GGroup::motion);
-  if (mode != kNoCode) modal_.motion = mode;
+  const GCode before = modal_.motion;
+  if (mode != kNoCode) change_mode(mode, block);
+  if (plan.motion > 30) return expanded_motion(block, plan, before);
   if (plan.motion == kNoCode || plan.motion == kRefusedMotion) return;
   const bool feeds = plan.motion != 0;
   const bool arc_motion = plan.motion == 20 || plan.motion == 30;

@@ -8,8 +8,6 @@
 namespace smoothpost::nc {
 namespace {
 
-constexpr std::size_t kZ = 2;
-
 AxisMask bit(std::size_t axis) { return static_cast<AxisMask>(1u << axis); }
 
 /// G54 is 1, G59.3 is 9.
@@ -19,53 +17,6 @@ int system_of(GCode code) {
 }
 
 }  // namespace
-
-void Executor::tool_length(const BlockWords& block) {
-  const GCode code = block.code(GGroup::length_offset);
-  if (!is_linuxcnc()) set_tcp_by_offset(code);
-  if (code == 490) return set_tool_length(0.0, 0, block.line);
-  if (code == 431) {
-    const AxisMask axes = axis_mask(block.letters);
-    if ((axes & ~bit(kZ)) != 0) {
-      log_.error("NC225", "G43.1 is read with Z only: the tool length along the tool axis",
-                 at(block, GGroup::length_offset));
-      return;
-    }
-    const double length = block.has('Z') ? block['Z'] * modal_.unit : coordinates_.tool()[kZ];
-    return set_tool_length(length, modal_.spindle_tool, block.line);
-  }
-  const int tool = block.has('H') ? static_cast<int>(std::lround(block['H'])) : modal_.spindle_tool;
-  if (tool == 0 && block.has('H')) return set_tool_length(0.0, 0, block.line);
-  if (tool == 0) {
-    log_.error("PR104",
-               g_code_text(code) +
-                   " without H, and no tool was changed to before: which length is meant is not "
-                   "known; write H with the tool's number or a tool change before it",
-               at(block, GGroup::length_offset));
-    return;
-  }
-  const auto found = settings_.tool_lengths.find(tool);
-  if (found == settings_.tool_lengths.end()) {
-    const std::string number = std::to_string(tool);
-    log_.error("PR102",
-               g_code_text(code) + " needs the length of tool " + number +
-                   ", which the program does not contain; "
-                   "give it by --tool " +
-                   number + "=LENGTH (mm)",
-               at(block, GGroup::length_offset));
-    return;
-  }
-  set_tool_length(found->second, tool, block.line);
-}
-
-void Executor::set_tool_length(double length, int tool, std::uint32_t line) {
-  AxisWords offset{};
-  offset[kZ] = length;
-  const bool same = offset == coordinates_.tool() && tool == modal_.length_tool;
-  coordinates_.set_tool(offset);
-  modal_.length_tool = tool;
-  if (!same) sink_.tool_length(length, tool, line);
-}
 
 void Executor::work_system(const BlockWords& block) {
   const int system = system_of(block.code(GGroup::work_system));
@@ -87,6 +38,7 @@ void Executor::announce_offset(std::uint32_t line) {
 void Executor::non_modal(const BlockWords& block, const BlockPlan& plan) {
   switch (block.code(GGroup::non_modal)) {
     case 100:
+      if (block['L'] != 2.0 && block['L'] != 20.0) return set_tool_data(block);
       return set_work_offset(block, plan);
     case 280:
       return go_home(block, plan, first_home_);

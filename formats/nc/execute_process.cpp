@@ -37,20 +37,21 @@ bool is_active(std::string_view text) {
 }  // namespace
 
 void Executor::comment(const BlockWords& block) {
-  const Piece& piece = program_.pieces[block.comment_piece];
-  std::string_view text(program_.text);
+  const Piece& piece = reader_.program().pieces[block.comment_piece];
+  std::string_view text(reader_.program().text);
   text = text.substr(piece.begin, piece.length);
   const bool parentheses = text.front() == '(';
   text = trimmed(parentheses ? text.substr(1, text.size() - 2) : text.substr(1));
   if (parentheses && begins_with(text, "MSG,")) {
-    return message(trimmed(text.substr(4)), block.line,
-                   reader_.place(block, block.comment_piece).column);
+    return message(trimmed(text.substr(4)), block.input_line,
+                   reader_.input_place(block, block.comment_piece).column);
   }
+  if (parentheses && is_linuxcnc() && active_comment(text, block)) return;
   if (parentheses && is_active(text)) {
     log_.note("NC231", "an active comment is kept as plain text; it does nothing here",
               reader_.place(block, block.comment_piece));
   }
-  if (!text.empty()) sink_.comment(text, block.line);
+  if (!text.empty()) sink_.comment(text, block.input_line);
 }
 
 void Executor::message(std::string_view text, std::uint32_t line, std::uint32_t column) {
@@ -90,10 +91,10 @@ void Executor::speed_and_tool(const BlockWords& block, const BlockPlan& plan) {
 }
 
 void Executor::process(const BlockWords& block, const BlockPlan& plan, bool after_motion) {
-  constexpr int kStopRank = 7;
+  if (block.m_count != 0 && !after_motion) note_switches(block);
   for (int i = 0; i < plan.action_count; ++i) {
     const ProcessAction& action = plan.actions[static_cast<std::size_t>(i)];
-    if ((action.rank == kStopRank) != after_motion) continue;
+    if ((action.rank >= kAfterMotion) != after_motion) continue;
     switch (action.kind) {
       case ProcessAction::Kind::event:
         act_on_row(block, action);
@@ -107,11 +108,25 @@ void Executor::process(const BlockWords& block, const BlockPlan& plan, bool afte
       case ProcessAction::Kind::tcp_off:
         set_tcp(false);
         break;
+      case ProcessAction::Kind::flow:
+        flow_word(block, action);
+        break;
       case ProcessAction::Kind::program_end:
-        sink_.program_end(block.line);
+        sink_.program_end(block.input_line);
         summary_.ended = true;
         break;
     }
+  }
+}
+
+/// Whether spindle and coolant are on, for cycles, parameters and M70.
+void Executor::note_switches(const BlockWords& block) {
+  for (int i = 0; i < block.m_count; ++i) {
+    const int m = block.m[static_cast<std::size_t>(i)];
+    if (m_group(m) == 7) modal_.spindle = m;
+    if (m == 7) modal_.mist = true;
+    if (m == 8) modal_.flood = true;
+    if (m == 9) modal_.mist = modal_.flood = false;
   }
 }
 
@@ -130,8 +145,8 @@ void Executor::emit_event(const EventRow& row, const BlockWords& block, std::uin
   ProcessEvent event;
   event.name = row.event;
   event.parameters = EventMatcher::values(row, block, modal_.words);
-  event.line = block.line;
-  event.column = reader_.place(block, piece).column;
+  event.line = block.input_line;
+  event.column = reader_.input_place(block, piece).column;
   sink_.event(event);
 }
 
@@ -140,16 +155,16 @@ void Executor::comment_words(const BlockWords& block, const ProcessAction& actio
   const GCode code = block.code(GGroup::non_modal);
   const bool whole = planner_.current().whole_comment;
   std::string text = "unmapped:";
-  const Block& span = program_.blocks[block.line - 1];
+  const Block& span = reader_.program().blocks[block.line - 1];
   for (std::uint32_t i = span.first_piece; i < span.first_piece + span.piece_count; ++i) {
-    const Piece& piece = program_.pieces[i];
+    const Piece& piece = reader_.program().pieces[i];
     if (piece.kind != PieceKind::word) continue;
     const bool letter = piece.letter != 'G' && piece.letter != 'M' && piece.letter != 'N' &&
                         (action.taken & letter_bit(piece.letter)) != 0;
     const bool shift = whole && piece.letter == 'G' && std::lround(piece.value * 10.0) == code;
     if (i == action.piece || letter || shift) text += " " + reader_.text(i);
   }
-  sink_.comment(text, block.line);
+  sink_.comment(text, block.input_line);
   if (action.m == 6) change_tool(block);
   if (m_group(action.m) == 7) modal_.spindle_row = nullptr;
 }
@@ -170,13 +185,13 @@ void Executor::set_tcp(bool on) {
 
 void Executor::dwell(const BlockWords& block) {
   if (block.code(GGroup::non_modal) != 40) return;
-  if (is_linuxcnc()) return sink_.dwell(block['P'], block.line);
-  if (is_siemens()) return sink_.dwell(block['F'], block.line);
+  if (is_linuxcnc()) return sink_.dwell(block['P'], block.input_line);
+  if (is_siemens()) return sink_.dwell(block['F'], block.input_line);
   constexpr double kMillisecond = 1e-3;
   const char letter = block.has('P') ? 'P' : block.has('X') ? 'X' : 'U';
   const std::uint32_t piece = block.piece[static_cast<std::size_t>(letter_index(letter))];
   const bool milliseconds = letter == 'P' && !reader_.has_point(piece);
-  sink_.dwell(block[letter] * (milliseconds ? kMillisecond : 1.0), block.line);
+  sink_.dwell(block[letter] * (milliseconds ? kMillisecond : 1.0), block.input_line);
 }
 
 }  // namespace smoothpost::nc

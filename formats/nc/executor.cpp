@@ -1,5 +1,6 @@
 #include "formats/nc/executor.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "kernels/core/units.h"
@@ -10,62 +11,137 @@ namespace {
 std::unique_ptr<WordValues> make_values(InputDialect dialect, const InterpreterSettings& settings,
                                         ControllerState state) {
   if (dialect == InputDialect::siemens) return std::make_unique<SiemensValues>(state.modal);
-  return std::make_unique<Rs274Values>(settings, state);
+  return std::make_unique<Rs274Values>(settings, dialect, state);
+}
+
+ToolTable tool_table(const InterpreterSettings& settings) {
+  ToolTable tools;
+  for (const auto& [tool, length] : settings.tool_lengths) tools[tool].length = length;
+  return tools;
+}
+
+/// What reading a block costs of the budget: 1, and 1 more for every 256 bytes.
+std::uint64_t cost_of(const Program& program, const Block& block) {
+  if (block.piece_count == 0) return 1;
+  const Piece& first = program.pieces[block.first_piece];
+  const Piece& last = program.pieces[block.first_piece + block.piece_count - 1];
+  return 1 + (last.begin + last.length - first.begin) / 256;
 }
 
 }  // namespace
 
 Executor::Executor(const Program& program, const InterpreterSettings& settings,
                    const EventMatcher& matcher, CanonicalSink& sink)
-    : program_(program),
+    : dialect_(program.dialect),
       settings_(settings),
       matcher_(matcher),
       sink_(sink),
       log_(program.file_name),
       coordinates_(settings),
+      tools_(tool_table(settings)),
       values_(make_values(program.dialect, settings,
-                          {coordinates_, modal_, first_home_, second_home_})),
+                          {coordinates_, modal_, first_home_, second_home_, tools_, place_})),
       reader_(program, settings, *values_, log_),
       planner_(settings, matcher, reader_, log_),
       systems_used_(kWorkSystems + 1, false) {
   modal_.unit = modal_.feed_unit = settings.inch_default ? kMillimetresPerInch : 1.0;
   // The motion mode after reset; RS274NGC has none.
   if (!is_linuxcnc()) modal_.motion = is_siemens() ? 10 : 0;
+  modal_.retract_to_old = !is_linuxcnc();
   first_home_.machine = second_home_.machine = settings.home;
+  units_.push_back(std::make_unique<ProgramUnit>());
+  unit_ = units_.back().get();
+  unit_->program = &program;
+  frames_.emplace_back();
+  // What the program costs when every block runs once.
+  constexpr std::uint64_t kMost = std::uint64_t{1} << 60;
+  budget_ =
+      std::min(settings.run_budget, kMost) + program.blocks.size() + program.text.size() / 256;
 }
 
 Result<InterpretationSummary> Executor::run() {
-  for (std::size_t i = 0; i < program_.blocks.size(); ++i) {
-    if (skipped(i)) continue;
-    const BlockWords& words = reader_.read(i);
-    if (words.percent) {
-      summary_.ended = percent_or_words_seen_;
-    } else {
-      block(words);
-    }
-    percent_or_words_seen_ = percent_or_words_seen_ || words.percent || words.words;
-    if (summary_.ended) {
-      if (!words.percent) note_text_after_end(i + 1);
-      break;
-    }
+  const Program& program = *unit_->program;
+  if (program.has_flow) tell_flow_faults(*unit_);
+  while (run_block()) {
   }
-  if (!summary_.ended) {
+  if (program.first_fault != 0 && !log_.has_error()) {
+    log_.error("NC200", "this line has text that could not be read; mend what the reader named",
+               {program.first_fault, 1});
+  }
+  if (!control_points_.empty() && !stopped_) {
+    stop("NC262", "the spline (G5.2) has no end: G5.3 is missing",
+         {static_cast<std::uint32_t>(program.blocks.size()), 1});
+  }
+  if (!summary_.ended && !stopped_) {
     log_.warning("NC229",
                  is_linuxcnc()
                      ? "the program ends without M2, M30 or a closing %: it is read to its last "
                        "line, but LinuxCNC refuses such a file"
                      : "the program ends without M2 or M30: it is read to its last line",
-                 {static_cast<std::uint32_t>(program_.blocks.size()), 0});
+                 {static_cast<std::uint32_t>(program.blocks.size()), 0});
   }
   if (log_.has_error()) return Result<InterpretationSummary>::failure(log_.take());
   return {std::move(summary_), log_.take()};
 }
 
+/// Runs the next block; false: there is none.
+bool Executor::run_block() {
+  const Program& program = *unit_->program;
+  if (place_.next >= program.blocks.size()) {
+    if (frames_.size() > 1) end_of_text();
+    return false;
+  }
+  const std::size_t index = place_.next++;
+  if (skipped(index)) return true;
+  const std::uint64_t cost = cost_of(program, program.blocks[index]);
+  if (cost > budget_) {
+    spend(cost, {static_cast<std::uint32_t>(index) + 1, 1});
+    return false;
+  }
+  budget_ -= cost;
+  const BlockWords& words = reader_.read(index);
+  if (words.flow_piece != BlockWords::kNone) {
+    flow(words);
+  } else if (words.percent) {
+    if (frames_.size() > 1) {
+      end_of_text();
+    } else {
+      summary_.ended = percent_or_words_seen_;
+    }
+  } else {
+    block(words);
+  }
+  percent_or_words_seen_ = percent_or_words_seen_ || words.percent || words.words;
+  if (!summary_.ended) return !stopped_;
+  if (!words.percent && frames_.size() == 1) note_text_after_end(index + 1);
+  return false;
+}
+
+/// Takes `amount` of the budget; false: it is used up, which is told and ends the run.
+bool Executor::spend(std::uint64_t amount, TextPlace place) {
+  if (amount <= budget_) {
+    budget_ -= amount;
+    return true;
+  }
+  stop("NC252",
+       "the program goes on here after " + std::to_string(settings_.run_budget) +
+           " repeated blocks and motions of cycles (the budget of loops and calls): an endless "
+           "loop, or one that is too long; let the CAM post write the moves out",
+       place);
+  return false;
+}
+
+void Executor::stop(const char* code, std::string text, TextPlace place) {
+  log_.error(code, std::move(text), place);
+  stopped_ = true;
+}
+
 bool Executor::skipped(std::size_t index) const {
-  const Block& block = program_.blocks[index];
   if (settings_.execute_deleted) return false;
+  const Program& program = *unit_->program;
+  const Block& block = program.blocks[index];
   for (std::uint32_t i = 0; i < block.piece_count && i < 2; ++i) {
-    if (program_.pieces[block.first_piece + i].kind == PieceKind::block_delete) return true;
+    if (program.pieces[block.first_piece + i].kind == PieceKind::block_delete) return true;
   }
   return false;
 }
@@ -76,6 +152,8 @@ void Executor::block(const BlockWords& block) {
     return;
   }
   if (planner_.plan(block, modal_)) {
+    if (block.code(GGroup::non_modal) == kMacroCall) return macro_call(block);
+    if (!control_points_.empty() && !may_stand_in_spline(block)) return;
     act(block, planner_.current());
   } else {
     recover(block);
@@ -149,6 +227,8 @@ void Executor::set_modes(const BlockWords& block) {
   if (distance != kNoCode) modal_.incremental = distance == 910;
   const GCode arc_distance = block.code(GGroup::arc_distance);
   if (arc_distance != kNoCode) modal_.arc_absolute = arc_distance == 901;
+  const GCode retract = block.code(GGroup::retract);
+  if (retract != kNoCode) modal_.retract_to_old = retract == 980;
 }
 
 /// After a refused block: takes over what can be told from it, so that later messages are about
@@ -170,7 +250,7 @@ void Executor::recover(const BlockWords& block) {
   if (arc_distance != kNoCode) modal_.arc_absolute = arc_distance == 901;
   const GCode mode = block.code(GGroup::motion);
   if (mode != kNoCode) {
-    const bool read = g_code_info(mode, program_.dialect).status == GStatus::read;
+    const bool read = g_code_info(mode, dialect_).status == GStatus::read;
     modal_.motion = read ? mode : kRefusedMotion;
   } else if (modal_.motion == kNoCode) {
     modal_.motion = kRefusedMotion;
@@ -189,11 +269,16 @@ void Executor::recover(const BlockWords& block) {
   }
 }
 
+/// Text behind the end that is no subroutine: one begins with an O word.
 void Executor::note_text_after_end(std::size_t index) {
-  for (std::size_t i = index; i < program_.blocks.size(); ++i) {
-    const Block& block = program_.blocks[i];
+  const Program& program = *unit_->program;
+  for (std::size_t i = index; i < program.blocks.size(); ++i) {
+    const Block& block = program.blocks[i];
     for (std::uint32_t k = 0; k < block.piece_count; ++k) {
-      const PieceKind kind = program_.pieces[block.first_piece + k].kind;
+      const Piece& piece = program.pieces[block.first_piece + k];
+      const PieceKind kind = piece.kind;
+      const bool label = kind == PieceKind::word && piece.letter == 'O' && called_;
+      if (kind == PieceKind::flow || label) return;
       if (kind == PieceKind::percent) return;
       if (kind != PieceKind::word && kind != PieceKind::construct) continue;
       log_.note("NC230", "the program has ended; the lines from here on are not read",

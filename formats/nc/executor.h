@@ -1,14 +1,20 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "formats/nc/block_plan.h"
 #include "formats/nc/block_words.h"
 #include "formats/nc/coordinates.h"
+#include "formats/nc/cycles.h"
 #include "formats/nc/interpreter.h"
 #include "formats/nc/modal_state.h"
+#include "formats/nc/program_unit.h"
+#include "formats/nc/spline_curve.h"
+#include "formats/nc/tool_table.h"
 #include "formats/nc/word_values.h"
 
 namespace smoothpost::nc {
@@ -16,8 +22,10 @@ namespace smoothpost::nc {
 /// Runs the blocks of one program in the order of execution of RS274NGC.
 ///
 /// One object runs one program. What a block does in which order stands in executor.cpp, motion in
-/// execute_motion.cpp, offsets and tool length in execute_offsets.cpp, process words and comments
-/// in execute_process.cpp, what only other controls have in execute_dialects.cpp.
+/// execute_motion.cpp, cycles in execute_cycles.cpp, splines in execute_splines.cpp, offsets in
+/// execute_offsets.cpp, tools in execute_tools.cpp, process words and comments in
+/// execute_process.cpp, loops and branches in execute_flow.cpp, calls in execute_calls.cpp, saved
+/// modal state in execute_saved_state.cpp, what only other controls have in execute_dialects.cpp.
 class Executor {
  public:
   Executor(const Program& program, const InterpreterSettings& settings, const EventMatcher& matcher,
@@ -26,6 +34,9 @@ class Executor {
 
  private:
   bool skipped(std::size_t index) const;
+  bool run_block();
+  bool spend(std::uint64_t amount, TextPlace place);
+  void stop(const char* code, std::string text, TextPlace place);
   void block(const BlockWords& block);
   void act(const BlockWords& block, const BlockPlan& plan);
   void set_modes(const BlockWords& block);
@@ -37,6 +48,7 @@ class Executor {
 
   void speed_and_tool(const BlockWords& block, const BlockPlan& plan);
   void process(const BlockWords& block, const BlockPlan& plan, bool after_motion);
+  void note_switches(const BlockWords& block);
   void act_on_row(const BlockWords& block, const ProcessAction& action);
   void emit_event(const EventRow& row, const BlockWords& block, std::uint32_t piece);
   void comment(const BlockWords& block);
@@ -56,8 +68,58 @@ class Executor {
   void warn_unknown(const BlockWords& block, AxisMask words);
   void announce_offset(std::uint32_t line);
 
-  bool is_linuxcnc() const { return program_.dialect == InputDialect::linuxcnc; }
-  bool is_siemens() const { return program_.dialect == InputDialect::siemens; }
+  FlowIndex& index_of(ProgramUnit& unit);
+  void tell_flow_faults(ProgramUnit& unit);
+  void flow(const BlockWords& block);
+  void loop(const FlowStatement& statement, std::uint32_t number);
+  void branch(const FlowStatement& statement);
+  void macro(const FlowStatement& statement);
+  void repeat(const FlowStatement& statement, std::uint32_t number);
+  std::optional<double> evaluate(const FlowStatement& statement, std::size_t offset);
+  bool holds(const FlowStatement& statement);
+  TextPlace flow_place(const FlowStatement& statement, std::size_t offset) const;
+  const FlowStatement& partner(std::uint32_t number);
+  void jump(std::uint32_t statement, bool behind);
+  void jump_behind(std::uint32_t statement);
+  void go_to(const FlowStatement& statement);
+  void go_to_number(std::uint32_t region, long number, TextPlace place);
+
+  void call(const FlowStatement& statement);
+  void give_back(const FlowStatement& statement);
+  void flow_word(const BlockWords& block, const ProcessAction& action);
+  void call_program(const BlockWords& block, const ProcessAction& action);
+  void call_local(const BlockWords& block, long number, CallFrame frame);
+  void macro_call(const BlockWords& block);
+  void end_program_call(const BlockWords& block, const ProcessAction& action);
+  bool enter_program(long number, CallFrame frame, bool& found);
+  bool enter(ProgramUnit& unit, CallFrame frame);
+  void leave_call();
+  ProgramUnit* unit_of_file(const std::string& name, TextPlace place);
+  void end_of_text();
+
+  void save_state(bool restores);
+  void restore_state(const SavedState& saved, const BlockWords& block);
+  void act_on_m(int m, const BlockWords& block);
+  bool active_comment(std::string_view text, const BlockWords& block);
+
+  void change_mode(GCode mode, const BlockWords& block);
+  void expanded_motion(const BlockWords& block, const BlockPlan& plan, GCode before);
+  void cycle(const BlockWords& block, const BlockPlan& plan, GCode before);
+  std::string remember_cycle(const BlockWords& block, GCode code, std::size_t normal);
+  long cycle_repeats(const BlockWords& block);
+  void drill(const BlockWords& block, const BlockPlan& plan, const CycleHole& hole);
+  void cycle_move(const BlockWords& block, const BlockPlan& plan, MotionKind kind,
+                  const AxisWords& program);
+  void spline(const BlockWords& block, const BlockPlan& plan, GCode before);
+  bool may_stand_in_spline(const BlockWords& block);
+  void add_control_point(const BlockWords& block, const BlockPlan& plan);
+  void end_spline(const BlockWords& block, bool closed);
+  void follow_curves(const BlockWords& block, const BlockPlan& plan,
+                     const std::vector<ControlNet>& curves);
+  void set_tool_data(const BlockWords& block);
+
+  bool is_linuxcnc() const { return dialect_ == InputDialect::linuxcnc; }
+  bool is_siemens() const { return dialect_ == InputDialect::siemens; }
   void statements(const BlockWords& block);
   void change_frame(const BlockWords& block);
   Mat3 frame_turn(const BlockWords& block) const;
@@ -86,7 +148,7 @@ class Executor {
   TextPlace at(const BlockWords& block, char letter) const;
   TextPlace at(const BlockWords& block, GGroup group) const;
 
-  const Program& program_;
+  const InputDialect dialect_;
   const InterpreterSettings& settings_;
   const EventMatcher& matcher_;
   CanonicalSink& sink_;
@@ -95,6 +157,8 @@ class Executor {
   Coordinates coordinates_;
   HomePosition first_home_;
   HomePosition second_home_;
+  ToolTable tools_;
+  ProgramPlace place_;
   std::unique_ptr<WordValues> values_;
   BlockReader reader_;
   BlockPlanner planner_;
@@ -105,6 +169,18 @@ class Executor {
   bool offset_dirty_ = true;  ///< the sink does not know the present work offset
   std::vector<bool> systems_used_;
   bool percent_or_words_seen_ = false;
+
+  std::vector<std::unique_ptr<ProgramUnit>> units_;      ///< the first is the program
+  std::unordered_map<std::string, ProgramUnit*> files_;  ///< by subroutine; nullptr: none
+  ProgramUnit* unit_ = nullptr;                          ///< whose blocks are run
+  std::uint32_t input_line_ = 0;                         ///< as BlockReader::select takes it
+  std::vector<CallFrame> frames_;                        ///< the first is the program
+  ControlNet control_points_;                            ///< of G5.2 so far, world coordinates
+  std::size_t spline_order_ = 3;
+  std::optional<Vec3> last_tangent_;  ///< of a G5: from its last inner control point to its end
+  bool called_ = false;               ///< some subroutine was called
+  std::uint64_t budget_ = 0;
+  bool stopped_ = false;  ///< what would come next is not known
 };
 
 }  // namespace smoothpost::nc

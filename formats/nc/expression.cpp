@@ -38,7 +38,11 @@ enum class Operator {
   logical_xor
 };
 
-int precedence(Operator op) {
+int precedence(Operator op, ExpressionRules rules) {
+  if (rules == ExpressionRules::fanuc) {
+    if (op == Operator::logical_and) return 5;
+    if (op == Operator::logical_or || op == Operator::logical_xor) return 4;
+  }
   switch (op) {
     case Operator::close:
       return 1;
@@ -71,10 +75,14 @@ constexpr std::array<std::string_view, 14> kFunctions = {"abs", "acos", "asin", 
                                                          "sin", "sqrt", "tan",  "exists"};
 constexpr std::size_t kLongestFunction = 6;
 
+/// A vacant variable counts as 0 in every computation.
+double filled(double value) { return std::isnan(value) ? 0.0 : value; }
+
 /// Recursive reader of one value. The first fault stops it.
 class Reader {
  public:
-  Reader(std::string_view text, const ParameterValues* values) : text_(text), values_(values) {}
+  Reader(std::string_view text, const ParameterValues* values, ExpressionRules rules)
+      : text_(text), values_(values), fanuc_(rules == ExpressionRules::fanuc), rules_(rules) {}
 
   Evaluated value() {
     out_.value = read_value();
@@ -85,15 +93,16 @@ class Reader {
   EvaluatedAssignment assignment() {
     EvaluatedAssignment result;
     take();  // #
-    if (peek() == '<') {
+    if (peek() == '<' && !fanuc_) {
       result.name = read_name();
     } else {
       result.index = read_index();
+      if (fanuc_ && values_ != nullptr && result.index == 0) fail("#0 cannot be assigned");
     }
     if (out_.ok() && peek() != '=') fail("= and a value are missing behind the parameter");
     if (out_.ok()) {
       take();
-      out_.value = read_value();
+      out_.value = fanuc_ ? read_chain(at_, false) : read_value();
     }
     out_.length = at_;
     result.value = std::move(out_);
@@ -128,6 +137,7 @@ class Reader {
 
   double finite(double value, std::size_t begin) {
     if (!out_.ok() || values_ == nullptr || std::isfinite(value)) return value;
+    if (fanuc_ && std::isnan(value)) return value;  // vacant
     return fail_at("the result is not a finite number", begin);
   }
 
@@ -145,7 +155,8 @@ class Reader {
       value = read_function();
     } else if ((c == '+' || c == '-') && signs_more()) {
       take();
-      value = c == '-' ? -read_value() : read_value();
+      value = read_value();
+      if (c == '-') value = fanuc_ ? -filled(value) : -value;
     } else {
       value = read_number();
     }
@@ -175,25 +186,45 @@ class Reader {
   double read_expression() {
     const std::size_t open = at_;
     take();
+    return read_chain(open, true);
+  }
+
+  /// Values and operators up to ], or as far as operators go.
+  double read_chain(std::size_t open, bool bracketed) {
     std::array<double, 7> values{};
     std::array<Operator, 7> operators{};
     std::array<std::size_t, 7> places{};  // of the right operands
     std::size_t top = 0;
     values[0] = read_value();
-    operators[0] = read_operator(open);
+    operators[0] = next_operator(open, bracketed);
     while (out_.ok() && operators[0] != Operator::close) {
       ++top;
       peek();
       places[top] = at_;
       values[top] = read_value();
-      operators[top] = read_operator(open);
-      while (out_.ok() && top > 0 && precedence(operators[top]) <= precedence(operators[top - 1])) {
+      operators[top] = next_operator(open, bracketed);
+      while (out_.ok() && top > 0 &&
+             precedence(operators[top], rules_) <= precedence(operators[top - 1], rules_)) {
         values[top - 1] = apply(operators[top - 1], values[top - 1], values[top], places[top]);
         operators[top - 1] = operators[top];
         --top;
       }
     }
     return values[0];
+  }
+
+  Operator next_operator(std::size_t open, bool bracketed) {
+    if (bracketed || !out_.ok()) return read_operator(open);
+    const char c = peek();
+    if (c == '+' || c == '-' || c == '*' || c == '/') return read_operator(open);
+    const std::size_t begin = at_;
+    if (is_letter(c)) {
+      take();
+      const Operator named = find_operator_name(c);
+      if (named != Operator::close) return named;
+    }
+    at_ = begin;
+    return Operator::close;
   }
 
   Operator read_operator(std::size_t open) {
@@ -210,7 +241,7 @@ class Reader {
       case '/':
         return Operator::divide;
       case '*':
-        return take_if('*') ? Operator::power : Operator::times;
+        return !fanuc_ && take_if('*') ? Operator::power : Operator::times;
       case '\0':
         fail_at("the bracket is not closed", open);
         return Operator::close;
@@ -220,6 +251,13 @@ class Reader {
   }
 
   Operator read_operator_name(char first, std::size_t begin) {
+    const Operator found = find_operator_name(first);
+    if (found == Operator::close) fail_at("an operator or ] is missing", begin);
+    return found;
+  }
+
+  /// The operator whose name begins with `first`, which is taken; close: there is none.
+  Operator find_operator_name(char first) {
     struct Name {
       std::string_view text;
       Operator op;
@@ -244,12 +282,28 @@ class Reader {
     for (const Name& name : kNames) {
       if (name.text == word) return name.op;
     }
-    fail_at("an operator or ] is missing", begin);
     return Operator::close;
   }
 
   double apply(Operator op, double left, double right, std::size_t place) {
     if (values_ == nullptr) return 0.0;
+    if (fanuc_) {
+      if (op == Operator::eq || op == Operator::ne) {
+        const bool vacant = std::isnan(left) || std::isnan(right);
+        const bool same = vacant ? std::isnan(left) && std::isnan(right) : left == right;
+        return same == (op == Operator::eq) ? 1.0 : 0.0;
+      }
+      left = filled(left);
+      right = filled(right);
+      if (op == Operator::logical_and || op == Operator::logical_or ||
+          op == Operator::logical_xor) {
+        const auto is_bit = [](double x) { return x == 0.0 || x == 1.0; };
+        if (!is_bit(left) || !is_bit(right)) {
+          return fail_at("AND, OR and XOR are read between conditions (0 and 1) only", place);
+        }
+      }
+      if (op == Operator::modulo) return std::fmod(left, right);
+    }
     switch (op) {
       case Operator::power:
         if (left < 0.0 && std::floor(right) != right) {
@@ -299,6 +353,7 @@ class Reader {
     while (is_letter(peek()) && name.size() <= kLongestFunction) name.push_back(take());
     bool known = false;
     for (const std::string_view function : kFunctions) known = known || function == name;
+    if (fanuc_ && name == "exists") known = false;
     if (!known) return fail_at("\"" + name + "\" is no function", begin);
     if (peek() != '[') return fail(name + " needs its argument in brackets");
     if (name == "exists") return read_exists();
@@ -306,9 +361,12 @@ class Reader {
     if (name == "atan") {
       if (!take_if('/')) return fail("atan needs two arguments: ATAN[y]/[x]");
       if (peek() != '[') return fail("atan needs its second argument in brackets");
-      return degrees_from_radians(std::atan2(argument, read_expression()));
+      const double second = read_expression();
+      return degrees_from_radians(fanuc_ ? std::atan2(filled(argument), filled(second))
+                                         : std::atan2(argument, second));
     }
-    return out_.ok() && values_ != nullptr ? call(name, argument, begin) : 0.0;
+    if (!out_.ok() || values_ == nullptr) return 0.0;
+    return call(name, fanuc_ ? filled(argument) : argument, begin);
   }
 
   double call(std::string_view name, double x, std::size_t begin) {
@@ -317,8 +375,8 @@ class Reader {
     if (name == "sin") return std::sin(radians_from_degrees(x));
     if (name == "tan") return std::tan(radians_from_degrees(x));
     if (name == "exp") return std::exp(x);
-    if (name == "fix") return std::floor(x);
-    if (name == "fup") return std::ceil(x);
+    if (name == "fix") return fanuc_ ? std::trunc(x) : std::floor(x);
+    if (name == "fup") return fanuc_ && x < 0.0 ? std::floor(x) : std::ceil(x);
     if (name == "round") return std::trunc(x + (x < 0.0 ? -0.5 : 0.5));
     if (name == "ln") {
       return x > 0.0 ? std::log(x) : fail_at("LN of a number that is not above 0", begin);
@@ -357,8 +415,11 @@ class Reader {
       fail_at(kNotWhole, begin);
       return 0;
     }
-    if (!(index > 0.5 && index < kParameters - 0.5)) {
-      fail_at("there is no parameter #" + shortest_text(std::round(index)) + "; they go to #5601",
+    if (fanuc_ && std::abs(index) < 0.5) return 0;
+    const int last = fanuc_ ? 99999 : kParameters - 1;
+    if (!(index > 0.5 && index < last + 0.5)) {
+      fail_at("there is no parameter #" + shortest_text(std::round(index)) + "; they go to #" +
+                  std::to_string(last),
               begin);
       return 0;
     }
@@ -383,6 +444,7 @@ class Reader {
     const std::size_t begin = at_;
     take();  // #
     const bool named = peek() == '<';
+    if (named && fanuc_) return fail("a named parameter is one of LinuxCNC");
     const std::string name = named ? read_name() : std::string();
     const int index = named ? 0 : read_index();
     if (!out_.ok() || values_ == nullptr) return 0.0;
@@ -395,6 +457,8 @@ class Reader {
 
   std::string_view text_;
   const ParameterValues* values_;
+  bool fanuc_;
+  ExpressionRules rules_;
   std::size_t at_ = 0;
   int depth_ = 0;
   Evaluated out_;
@@ -402,12 +466,14 @@ class Reader {
 
 }  // namespace
 
-Evaluated evaluate_value(std::string_view text, const ParameterValues* values) {
-  return Reader(text, values).value();
+Evaluated evaluate_value(std::string_view text, const ParameterValues* values,
+                         ExpressionRules rules) {
+  return Reader(text, values, rules).value();
 }
 
-EvaluatedAssignment evaluate_assignment(std::string_view text, const ParameterValues* values) {
-  return Reader(text, values).assignment();
+EvaluatedAssignment evaluate_assignment(std::string_view text, const ParameterValues* values,
+                                        ExpressionRules rules) {
+  return Reader(text, values, rules).assignment();
 }
 
 bool begins_expression(std::string_view text) {

@@ -7,7 +7,11 @@
 
 namespace smoothpost::nc {
 
-/// The value of a parameter, or why it has none.
+/// Whose expressions are read.
+enum class ExpressionRules : std::uint8_t { linuxcnc, fanuc };
+
+/// The value of a parameter, or why it has none. A variable of the Fanuc family that was never
+/// assigned is vacant: its value is a NaN.
 struct ParameterValue {
   double value = 0.0;
   std::string problem;
@@ -44,11 +48,18 @@ struct EvaluatedAssignment {
 /// Operators from strong to weak: `**`; `*` `/` `MOD`; `+` `-`; `EQ NE GT GE LT LE`; `AND OR XOR`;
 /// equal ones from left to right. EQ and NE take values within 1e-4 as equal, as the installed
 /// interpreter does. MOD is never negative. Guarantees: test "expression: against rs274".
+///
+/// Under the rules of the Fanuc family there are no names, `**` and EXISTS; AND binds like `*`, OR
+/// and XOR like `+`, and all three take 0 and 1 only; EQ and NE are exact; FIX and FUP go towards 0
+/// and away from it; `#0` and variables without a value are vacant: 0 in a computation, equal only
+/// to each other under EQ and NE.
 /// @param values  nullptr: only the text is checked, the value has no meaning
-Evaluated evaluate_value(std::string_view text, const ParameterValues* values);
+Evaluated evaluate_value(std::string_view text, const ParameterValues* values,
+                         ExpressionRules rules = ExpressionRules::linuxcnc);
 
 /// Reads an assignment at the start of `text`, which begins with #.
-EvaluatedAssignment evaluate_assignment(std::string_view text, const ParameterValues* values);
+EvaluatedAssignment evaluate_assignment(std::string_view text, const ParameterValues* values,
+                                        ExpressionRules rules = ExpressionRules::linuxcnc);
 
 /// Whether a value other than a plain number begins `text`: [, #, a function, or one behind signs.
 bool begins_expression(std::string_view text);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -33,6 +34,18 @@ struct InterpreterSettings {
   /// (calculator type) or 0.001 (least increment; a tenth of it in inch for lengths). Unset: such
   /// numbers are refused, but 0.
   std::optional<double> integer_increment;
+
+  /// Folders with files of subroutines (subroutine_files.h), in the order of the search. None: only
+  /// subroutines in the program's own text are called.
+  std::vector<std::string> subroutine_folders;
+  /// How much a program may run beyond its own length: blocks that loops and calls run again,
+  /// motions that cycles and splines stand for, 256 bytes of a block or a file each. What would go
+  /// on is refused, so that memory and time stay bounded.
+  std::uint64_t run_budget = 1'000'000;
+  /// Calls within each other; LinuxCNC allows 9.
+  int call_depth = 9;
+  /// A machine program: lines of program flow, calls, cycles, splines and G10 L1 are refused.
+  bool plain_blocks = false;
 };
 
 struct InterpretationSummary {
@@ -43,10 +56,15 @@ struct InterpretationSummary {
   std::vector<int> work_systems;  ///< systems used by motions, in order of first use
 };
 
-/// Runs the program through the modal state of its dialect (Program::dialect) and calls `sink` for
-/// every motion, dwell, event and comment in the order in which that controller would act. Errors
-/// are collected: reading goes on after a bad block so that one run names every problem, but then
-/// the result has no value and what `sink` got is not a program.
+/// Runs the program, with its loops and subroutines, through the modal state of its dialect
+/// (Program::dialect) and calls `sink` for every motion, dwell, event and comment in the order in
+/// which that controller would act. Errors are collected: reading goes on after a bad block so that
+/// one run names every problem, but then the result has no value and what `sink` got is not a
+/// program. A fault of the program's flow ends the run: what would come next is not known.
+///
+/// Lines are those of the program; what a subroutine in a file of its own does has the line of its
+/// call. Diagnostics name the file and line of the fault. Cycles arrive as rapids, feeds, dwells
+/// and spindle events; splines as straight pieces within kSplineTolerance (spline_curve.h).
 ///
 /// A tool axis by vector (fanuc G43.5, siemens A3= B3= C3=) arrives as
 /// CanonicalMotion::axis_vector; the A B C bits of its unknown_start and unknown_end then say

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "formats/nc/codes.h"
@@ -12,9 +13,21 @@ namespace smoothpost::nc {
 /// further message until the next G0, G1, G2, G3 or G80.
 inline constexpr GCode kRefusedMotion = -2;
 
+/// What a canned cycle keeps for the next hole, as programmed.
+struct CycleMemory {
+  std::optional<double> bottom;                             ///< word along the plane's normal
+  std::optional<double> retract;                            ///< R
+  std::optional<double> peck;                               ///< Q
+  std::optional<double> dwell;                              ///< P, s
+  std::optional<double> shift_first, shift_second, middle;  ///< G87
+  double level = 0.0;  ///< height at the start of the series, program coordinates, mm
+};
+
 /// The modal state of RS274NGC but for coordinates; the values are those at the start of a program.
 struct ModalState {
   GCode motion = kNoCode;
+  GCode base_motion = 0;  ///< the last of G0 to G3, which G80 goes back to in the Fanuc family
+  CycleMemory cycle;
   GCode plane = 170;
   bool incremental = false;
   bool arc_absolute = false;
@@ -35,6 +48,10 @@ struct ModalState {
   int spindle_tool = 0;                   ///< tool of the last M6; 0: none yet
   std::string spindle_tool_name;          ///< siemens: its name, when it has one
   int length_tool = 0;                    ///< tool of the active G43; 0: none
+  int spindle = 5;                        ///< the last of M3, M4, M5 (and M19)
+  bool mist = false;                      ///< M7
+  bool flood = false;                     ///< M8
+  bool retract_to_old = false;            ///< G98: cycles end at the height of their start
   const EventRow* spindle_row = nullptr;  ///< event of the last M3, M4, M5 or M19 that has one
 };
 

@@ -4,54 +4,53 @@
 #include <string_view>
 #include <unordered_map>
 
-#include "formats/nc/coordinates.h"
-#include "formats/nc/expression.h"
+#include "formats/nc/flow_words.h"
 #include "formats/nc/interpreter.h"
-#include "formats/nc/modal_state.h"
+#include "formats/nc/parameter_store.h"
 
 namespace smoothpost::nc {
 
-/// What system parameters tell of; it outlives the parameters.
-struct ControllerState {
-  const Coordinates& coordinates;
-  const ModalState& modal;
-  const HomePosition& first_home;
-  const HomePosition& second_home;
-};
-
-/// The parameters of one run of a program: what it assigned, and LinuxCNC's system parameters,
-/// computed from the modal state when they are asked for.
+/// The parameters of LinuxCNC: what the program assigned, and the system parameters, computed from
+/// the modal state when they are asked for.
 ///
-/// Lengths of #5161 to #5390 and of #5401 to #5409 are in the machine's unit
-/// (InterpreterSettings::inch_default), #5420 to #5428 in the program's; angles in degrees.
-class Parameters final : public ParameterValues {
+/// Lengths of #5161 to #5390 and of #5401 to #5410 are in the machine's unit
+/// (InterpreterSettings::inch_default), #5420 to #5428 and named positions in the program's; angles
+/// in degrees. A subroutine has its own #1 to #30 (0 without an argument) and its own names; names
+/// that begin with _ are those of the whole program.
+class Parameters final : public ParameterStore {
  public:
   Parameters(const InterpreterSettings& settings, ControllerState state)
-      : settings_(settings),
-        coordinates_(state.coordinates),
-        modal_(state.modal),
-        first_(state.first_home),
-        second_(state.second_home) {}
+      : settings_(settings), state_(state), names_(1) {}
 
   ParameterValue numbered(int index) const override;
   ParameterValue named(std::string_view name) const override;
-
-  /// Why `#index` or `#<name>` cannot be assigned; empty: it can.
-  std::string refusal(const EvaluatedAssignment& assignment) const;
-  void assign(const EvaluatedAssignment& assignment);
+  std::string refusal(const EvaluatedAssignment& assignment) const override;
+  void assign(const EvaluatedAssignment& assignment) override;
+  void enter(const CallScope& scope) override;
+  void leave() override;
+  void set_result(std::optional<double> value) override { result_ = value; }
 
  private:
+  using Names = std::unordered_map<std::string, double>;
+  struct Saved {
+    std::array<double, kMostArguments> values{};
+    bool own_numbers = false;
+  };
+
   double system_value(int index) const;
+  ParameterValue tool_value(int index) const;
+  ParameterValue position(std::size_t axis, const std::string& name, bool machine) const;
+  std::optional<double> computed(std::string_view name) const;
   double length_in(double unit, std::size_t axis, double value) const;
-  double position(std::size_t axis) const;
+  double value_of(int index) const;
 
   const InterpreterSettings& settings_;
-  const Coordinates& coordinates_;
-  const ModalState& modal_;
-  const HomePosition& first_;
-  const HomePosition& second_;
+  ControllerState state_;
   std::unordered_map<int, double> numbers_;
-  std::unordered_map<std::string, double> names_;
+  Names globals_;
+  std::vector<Names> names_;  ///< one of each call level
+  std::vector<Saved> saved_;
+  std::optional<double> result_;
 };
 
 }  // namespace smoothpost::nc

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "formats/nc/expression.h"
+#include "formats/nc/flow_words.h"
 #include "formats/nc/siemens_builder.h"
 #include "formats/nc/tree_builder.h"
 
@@ -66,13 +67,16 @@ class Rs274Builder final : public TreeBuilder {
 
  private:
   bool is_linuxcnc() const { return program_.dialect == InputDialect::linuxcnc; }
+  ExpressionRules rules() const {
+    return is_linuxcnc() ? ExpressionRules::linuxcnc : ExpressionRules::fanuc;
+  }
 
   const char* word(const char* begin) {
     const char letter = static_cast<char>(*begin & ~0x20);
     const char* number = begin + 1;
     while (number != line_end_ && detail::is_blank(*number)) ++number;
     const ScannedNumber scanned = scan_number(number, line_end_);
-    if (!scanned.ok) return letter == 'O' ? o_word(begin) : expression_word(letter, begin, number);
+    if (!scanned.ok) return no_number(letter, begin, number);
     const char* next = scanned.next;
     if (next != line_end_ && (*next == '.' || *next == ',' || *next == '=' || *next == '_')) {
       return construct(begin);
@@ -110,15 +114,46 @@ class Rs274Builder final : public TreeBuilder {
              program_.pieces[program_.pieces.size() - 2].letter == 'N');
   }
 
+  const char* no_number(char letter, const char* begin, const char* value) {
+    if (letter == 'O') return o_word(begin);
+    if (!is_linuxcnc() && begins_macro(rest_of_line(begin))) return macro(begin);
+    return expression_word(letter, begin, value);
+  }
+
   const char* o_word(const char* begin) {
-    return push_construct({Construct::o_word, length_to_comment(rest_of_line(begin))}, begin);
+    const std::string_view text(begin, length_to_comment(rest_of_line(begin)));
+    if (!is_linuxcnc() || words_besides_n()) {
+      return push_construct({Construct::o_word, static_cast<std::uint32_t>(text.size())}, begin);
+    }
+    return flow(read_o_line(text), text);
+  }
+
+  const char* macro(const char* begin) {
+    const std::string_view text(begin, length_to_comment(rest_of_line(begin)));
+    if (words_besides_n()) {
+      return push_construct({Construct::name, static_cast<std::uint32_t>(text.size())}, begin);
+    }
+    return flow(read_macro_line(text), text);
+  }
+
+  const char* flow(const FlowText& read, std::string_view text) {
+    if (!read.ok()) {
+      error("NC150", "the line of program flow cannot be read: " + read.problem,
+            text.data() + read.at);
+    }
+    push(read.ok() ? PieceKind::flow : PieceKind::construct, text.data(),
+         text.data() + text.size());
+    program_.pieces.back().detail = static_cast<std::uint8_t>(read.kind);
+    program_.has_flow = program_.has_flow || read.ok();
+    words_in_line_ = words_seen_ = true;
+    return text.data() + text.size();
   }
 
   /// X[1+2], X#5, X-SIN[30]: a word whose value is computed when its block runs.
   const char* expression_word(char letter, const char* begin, const char* value) {
     const std::string_view rest = rest_of_line(value);
-    if (!is_linuxcnc() || letter == 'N' || !begins_expression(rest)) return construct(begin);
-    const Evaluated found = evaluate_value(rest, nullptr);
+    if (letter == 'N' || !begins_expression(rest)) return construct(begin);
+    const Evaluated found = evaluate_value(rest, nullptr, rules());
     if (!found.ok()) return refuse_expression(begin, value, found);
     ScannedNumber span;
     span.next = value + found.length;
@@ -127,7 +162,7 @@ class Rs274Builder final : public TreeBuilder {
   }
 
   const char* assignment(const char* begin) {
-    const Evaluated found = evaluate_assignment(rest_of_line(begin), nullptr).value;
+    const Evaluated found = evaluate_assignment(rest_of_line(begin), nullptr, rules()).value;
     if (!found.ok()) return refuse_expression(begin, begin, found);
     push(PieceKind::assignment, begin, begin + found.length);
     words_in_line_ = words_seen_ = true;
@@ -178,7 +213,7 @@ class Rs274Builder final : public TreeBuilder {
   }
 
   const char* construct(const char* begin) {
-    if (*begin == '#' && is_linuxcnc()) return assignment(begin);
+    if (*begin == '#') return assignment(begin);
     return push_construct(measure_construct(rest_of_line(begin)), begin);
   }
 

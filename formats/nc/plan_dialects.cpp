@@ -28,7 +28,7 @@ bool BlockPlanner::takes_axes(const BlockWords& block) const {
   if (dialect_ == InputDialect::siemens) return has_frame(block);
   // G4 X2.5; G05.1 Q2 X0 Y0 Z0 names the axes that are smoothed.
   const GCode mode = block.code(GGroup::no_effect);
-  return code == 40 || (mode == 51 && block.has('Q') && block['Q'] == 2.0);
+  return code == 40 || code == kMacroCall || (mode == 51 && block.has('Q') && block['Q'] == 2.0);
 }
 
 /// Which words of the block are components of the tool axis.

@@ -19,6 +19,7 @@ enum class PieceKind : std::uint8_t {
   word,          ///< address and number: G1, X-1.5, N10, A3=0.1
   assignment,    ///< #1=5, #<depth>=[2*3]; R1=5 of siemens
   statement,     ///< siemens: TRAORI, MSG("text"), CTOL=0.02
+  flow,          ///< o100 while [..], IF [..] GOTO 5: what runs next; `detail` is its FlowKind
   comment,       ///< ( ... ) or ; to the end of the line
   block_delete,  ///< /
   percent,       ///< %
@@ -47,7 +48,7 @@ inline constexpr char kPlaneAngle = 'Z' + 6;    ///< RPL
 struct Piece {
   PieceKind kind = PieceKind::space;
   char letter = 0;          ///< upper case, kind word
-  std::uint8_t detail = 0;  ///< kind word: WordForm; kind statement: SiemensWord
+  std::uint8_t detail = 0;  ///< kind word: WordForm; statement: SiemensWord; flow: FlowKind
   std::uint32_t begin = 0;  ///< byte offset into Program::text
   std::uint32_t length = 0;
   double value = 0.0;  ///< kind word
@@ -59,6 +60,15 @@ struct Block {
   std::uint32_t piece_count = 0;
 };
 
+/// A fault of text behind the end of the program. Controllers read such text only when a
+/// subroutine stands there that is called.
+struct LateFault {
+  std::uint32_t line = 0;
+  std::uint32_t column = 0;
+  const char* code = "";
+  std::string text;
+};
+
 /// NC text as a tree: one block a line, pieces with spans. Line = block index + 1; a piece's column
 /// is its offset from the block's first piece + 1.
 struct Program {
@@ -67,6 +77,11 @@ struct Program {
   std::string text;
   std::vector<Block> blocks;
   std::vector<Piece, LargePageAllocator<Piece>> pieces;
+  bool has_flow = false;                 ///< some piece is of kind flow
+  std::uint32_t first_fault = 0;         ///< line of the first fault before the end; 0: none
+  std::uint32_t end_block = 0xffffffff;  ///< first block behind M2 or M30
+  std::vector<LateFault> late_faults;    ///< at most kLateFaults, in order of the text
+  static constexpr std::size_t kLateFaults = 100;
 };
 
 /// The text of the program, put together from its pieces: equal to the text that was parsed, byte

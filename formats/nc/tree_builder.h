@@ -64,7 +64,14 @@ class TreeBuilder {
   }
 
   void error(const char* code, std::string why, const char* where) {
-    if (!quiet_) log_.error(code, std::move(why), place(where));
+    if (!quiet_) {
+      if (program_.first_fault == 0) program_.first_fault = line_number_;
+      return log_.error(code, std::move(why), place(where));
+    }
+    if (program_.late_faults.size() < Program::kLateFaults) {
+      const TextPlace at = place(where);
+      program_.late_faults.push_back({at.line, at.column, code, std::move(why)});
+    }
   }
 
   TextPlace place(const char* p) const {
@@ -107,7 +114,7 @@ class TreeBuilder {
   bool deleted_ = false;
   bool percent_closes_ = false;
   bool ended_ = false;  ///< the end of the program stands in a line before or in this one
-  bool quiet_ = false;  ///< this line is behind the end of the program: controllers do not read it
+  bool quiet_ = false;  ///< this line is behind the end of the program
 
  private:
   const char* line(const char* begin) {
@@ -118,6 +125,9 @@ class TreeBuilder {
     words_in_line_ = false;
     only_blanks_ = true;
     deleted_ = false;
+    if (ended_ && !quiet_) {
+      program_.end_block = static_cast<std::uint32_t>(program_.blocks.size());
+    }
     quiet_ = ended_;
     if (in_trailer_) {
       if (begin != line_end_) push(PieceKind::trailer, begin, line_end_);

@@ -1,8 +1,11 @@
 #include "formats/nc/word_values.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "formats/nc/macro_variables.h"
 #include "formats/nc/number.h"
+#include "formats/nc/parameters.h"
 
 namespace smoothpost::nc {
 namespace {
@@ -25,14 +28,30 @@ std::string name_before(std::string_view text, std::size_t end) {
 
 }  // namespace
 
+Rs274Values::Rs274Values(const InterpreterSettings& settings, InputDialect dialect,
+                         ControllerState state)
+    : modal_(state.modal), rules_(ExpressionRules::fanuc) {
+  if (dialect == InputDialect::linuxcnc) {
+    rules_ = ExpressionRules::linuxcnc;
+    store_ = std::make_unique<Parameters>(settings, state);
+  } else {
+    store_ = std::make_unique<MacroVariables>(state);
+  }
+}
+
 Evaluated Rs274Values::word(std::string_view text, WordForm) {
-  return behind(text, 1, [&](std::string_view rest) { return evaluate_value(rest, &parameters_); });
+  Evaluated found = behind(text, 1, [&](std::string_view rest) { return value(rest); });
+  if (found.ok() && std::isnan(found.value)) {
+    found.problem = "it is vacant, and the control passes over the word; give it a value before";
+    found.at = 0;
+  }
+  return found;
 }
 
 Evaluated Rs274Values::assign(std::string_view text) {
-  EvaluatedAssignment assignment = evaluate_assignment(text, &parameters_);
+  EvaluatedAssignment assignment = evaluate_assignment(text, store_.get(), rules_);
   if (assignment.value.ok()) {
-    assignment.value.problem = parameters_.refusal(assignment);
+    assignment.value.problem = store_->refusal(assignment);
     if (assignment.value.ok()) pending_.push_back(assignment);
   }
   return assignment.value;
@@ -40,7 +59,7 @@ Evaluated Rs274Values::assign(std::string_view text) {
 
 void Rs274Values::finish_block(bool good) {
   if (good) {
-    for (const EvaluatedAssignment& assignment : pending_) parameters_.assign(assignment);
+    for (const EvaluatedAssignment& assignment : pending_) store_->assign(assignment);
   }
   pending_.clear();
 }

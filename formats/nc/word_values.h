@@ -1,27 +1,36 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "formats/nc/block_words.h"
-#include "formats/nc/parameters.h"
+#include "formats/nc/interpreter.h"
+#include "formats/nc/parameter_store.h"
 #include "formats/nc/siemens_expression.h"
 
 namespace smoothpost::nc {
 
-/// Expressions and assignments of RS274NGC: an assignment takes effect when its block was read.
+/// Expressions and assignments of RS274NGC and of the Fanuc family: an assignment takes effect when
+/// its block was read.
 class Rs274Values final : public WordValues {
  public:
-  Rs274Values(const InterpreterSettings& settings, ControllerState state)
-      : modal_(state.modal), parameters_(settings, state) {}
+  /// @param dialect  linuxcnc, fanuc or haas
+  Rs274Values(const InterpreterSettings& settings, InputDialect dialect, ControllerState state);
 
   Evaluated word(std::string_view text, WordForm form) override;
   Evaluated assign(std::string_view text) override;
   void finish_block(bool good) override;
   bool inch() const override { return modal_.unit != 1.0; }
+  bool in_cycle() const override { return is_cycle(modal_.motion); }
+  Evaluated value(std::string_view text) override {
+    return evaluate_value(text, store_.get(), rules_);
+  }
+  ParameterStore* store() override { return store_.get(); }
 
  private:
   const ModalState& modal_;
-  Parameters parameters_;
+  ExpressionRules rules_;
+  std::unique_ptr<ParameterStore> store_;
   std::vector<EvaluatedAssignment> pending_;
 };
 

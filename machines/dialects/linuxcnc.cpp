@@ -365,6 +365,7 @@ Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
   nc::InterpreterSettings settings;
   settings.inch_default = machine.dialect.units == "inch";
   settings.has_tcp = false;
+  settings.plain_blocks = true;
   settings.process = machine.process;
   settings.axes = 0;
   for (const auto& axis : machine.axes) {

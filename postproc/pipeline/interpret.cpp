@@ -422,6 +422,7 @@ nc::InterpreterSettings interpreter_settings(const InputSettings& settings) {
   nc::InterpreterSettings s;
   s.tool_lengths = settings.tool_lengths;
   s.integer_increment = settings.integer_unit;
+  s.subroutine_folders = settings.subroutine_folders;
   s.work_offsets = settings.work_offsets;
   if (settings.machine) {
     s.axes = 0;

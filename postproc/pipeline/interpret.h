@@ -24,6 +24,7 @@ struct InputSettings {
   std::optional<nc::InputDialect> dialect;  ///< nothing: found out when only one fits the text
   /// fanuc, haas: mm or deg that one unit of a number without point is; nothing: refused
   std::optional<double> integer_unit;
+  std::vector<std::string> subroutine_folders;  ///< where NC text may find files of subroutines
   cl::ReaderSettings cl;  ///< of CL data; its process table is taken from the members above
 };
 

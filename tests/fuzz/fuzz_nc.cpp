@@ -39,6 +39,7 @@ class Listener : public CanonicalSink {
 nc::InterpreterSettings shop_settings() {
   nc::InterpreterSettings settings;
   settings.tool_lengths = {{1, 60.0}, {2, 80.0}};
+  settings.run_budget = 5000;
   const auto row = [&](const char* event, const char* text) {
     EventWords words;
     words.event = event;
@@ -46,6 +47,7 @@ nc::InterpreterSettings shop_settings() {
     settings.process.events.push_back(words);
   };
   row(event_name::kSpindleOn, "M3 S{rpm}");
+  row(event_name::kSpindleOnReverse, "M4 S{rpm}");
   row(event_name::kSpindleOff, "M5");
   row(event_name::kToolChange, "T{tool} M6");
   row(event_name::kStop, "M0");

@@ -55,6 +55,7 @@ const nc::InterpreterSettings& lenient() {
   static const nc::InterpreterSettings settings = [] {
     nc::InterpreterSettings s = mill_settings();
     s.process.unmapped = UnmappedWords::comment;
+    s.run_budget = 50'000;  // endless mutants end soon
     return s;
   }();
   return settings;

@@ -86,7 +86,10 @@ TEST_CASE("offsets: G10 L2 and XY rotation", "[formats][nc][offsets]") {
   CHECK(run_lines("G10 L2 P10 X1").errors() == one("NC218"));
   CHECK(run_lines("G10 L2 X1").errors() == one("NC218"));
   CHECK(run_lines("G10 X1").errors() == one("NC218"));
-  CHECK(run_lines("G10 L1 P1 Z5").errors() == one("NC218"));
+  CHECK(run_lines("G10 L1 Z5").errors() == one("NC218"));
+  CHECK(run_lines("G10 L1 P1 X5").errors() == one("NC218"));
+  CHECK(run_lines("G10 L11 P0 Z5").errors() == one("NC218"));
+  CHECK(run_lines("G10 L3 P1 Z5").errors() == one("NC218"));
   CHECK(run_lines("G10 L20 P1 X0 R30").errors() == one("NC218"));
   CHECK(run_lines("G10 L2 P1 I3").errors() == one("NC215"));
   CHECK(run_lines("G91 G10 L2 P1 X3\nG10 L2 P0 X1\nG90 G0 X1").sink.motions.back().end[0] == 2.0);

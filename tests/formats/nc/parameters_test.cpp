@@ -50,7 +50,10 @@ TEST_CASE("parameters: position, offsets, tool and modes", "[formats][nc][parame
   CHECK(x("#<_coord_system>") == 550.0);
   CHECK(last_x(run_lines("G10 L2 P3 X7 R30\nG0 X[#5261+#5270]")) == Approx(37.0));
   CHECK(last_x(run_lines("G0 X3\nG92 X5\nG0 X[#5210*100+#5211]")) == Approx(98.0 - 2.0));
-  CHECK(last_x(run_lines("G43.1 Z12\nG0 X#5403")) == 12.0);
+  // The tool table's length, whatever length is in force.
+  CHECK(last_x(run_lines("T1 M6\nG43.1 Z12\nG0 X#5403", settings)) == 50.0);
+  CHECK(last_x(run_lines("T7 M6\nG10 L1 P7 Z30 R2\nG0 X[#5403+#5410]", settings)) == 34.0);
+  CHECK(last_x(run_lines("G0 X1\nG92 X5\nG53 G0 X7\nG91 G0 X#<_abs_x>")) == 14.0);
   CHECK(last_x(run_lines("G20 G0 X1\nG0 X[#5420*2]")) == Approx(50.8));
   CHECK(last_x(run_lines("G0 X4\nG28.1\nG0 X[#5161+1]")) == 5.0);
 }
@@ -61,11 +64,14 @@ TEST_CASE("parameters: ten faults with line and column", "[formats][nc][paramete
     const char* code;
     int column;
   };
-  const Row rows[] = {
-      {"G0 X[1/0]", "NC131", 8},        {"G0 X#<a>", "NC131", 5},  {"G0 X1 Y#0", "NC131", 9},
-      {"#5420=1", "NC132", 1},          {"#5221=1", "NC132", 1},   {"#<_x>=1", "NC132", 1},
-      {"G0 X#<_hal[pin]>", "NC131", 5}, {"G0 X#5421", "NC131", 5}, {"#1=[SQRT[-1]]", "NC132", 5},
-      {"G0 X#5410", "NC131", 5},        {"G[1.5] X1", "NC201", 1}, {"G0 X[2", "NC130", 5}};
+  const Row rows[] = {{"G0 X[1/0]", "NC131", 8},        {"G0 X#<a>", "NC131", 5},
+                      {"G0 X1 Y#0", "NC131", 9},        {"#5420=1", "NC132", 1},
+                      {"#5221=1", "NC132", 1},          {"#<_x>=1", "NC132", 1},
+                      {"G0 X#<_hal[pin]>", "NC131", 5}, {"G0 X#5421", "NC131", 5},
+                      {"#1=[SQRT[-1]]", "NC132", 5},    {"G0 X#5410", "NC131", 5},
+                      {"G0 X#5403", "NC131", 5},        {"G0 X#5399", "NC131", 5},
+                      {"G0 X#<_task>", "NC131", 5},     {"#<_line>=1", "NC132", 1},
+                      {"G[1.5] X1", "NC201", 1},        {"G0 X[2", "NC130", 5}};
   for (const Row& row : rows) {
     const Run r = run(std::string(row.line) + "\nM2\n");
     INFO(row.line << "\n" << r.all_text());

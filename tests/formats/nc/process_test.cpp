@@ -182,7 +182,7 @@ TEST_CASE("process: comments", "[formats][nc][process]") {
       ";MSG, no message",
       mill_settings());
   CHECK(r.sink.comments ==
-        Texts{"plain text", "to the end", "last", "DEBUG, #1", "MSG, no message"});
+        Texts{"plain text", "to the end", "last", "DEBUG, 0.000000", "MSG, no message"});
   CHECK(r.sink.event_texts() == Texts{"message text=hello", "message text=two"});
   CHECK(r.codes(Severity::note) == Texts{"NC231"});
   CHECK(r.sink.of("comment").at(2).motions_before == 0);

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <array>
+#include <iosfwd>
 #include <string>
 #include <vector>
 
+#include "formats/nc/interpreter.h"
 #include "kernels/core/pose.h"
 
 // LinuxCNC's own interpreter as an independent judge of positions.
@@ -26,6 +28,7 @@ struct OracleRun {
   bool rotated = false;  ///< an XY rotation was active at some time
   std::string message;   ///< the last line of its complaint
   std::vector<OracleMotion> motions;
+  std::vector<std::string> messages;  ///< of DEBUG and PRINT comments, in order
 };
 
 bool oracle_present();
@@ -33,7 +36,25 @@ bool oracle_present();
 /// Length of tool `n` in the oracle's tool table, mm (1 <= n <= 99).
 double oracle_tool_length(int n);
 
+/// Reads the lines that `rs274 -g` prints into `run`.
+void read_canonical(std::istream& text, OracleRun& run);
+
 /// Runs `rs274 -g` on the text in a folder of its own.
 OracleRun run_oracle(const std::string& text);
+
+/// How the oracle's machine is described to our interpreter.
+nc::InterpreterSettings oracle_settings();
+
+struct Comparison {
+  std::string problem;  ///< empty: the motions are the same
+  std::size_t motions = 0;
+  std::size_t arcs = 0;
+  std::size_t times = 0;
+  double worst = 0.0;
+};
+
+/// Ends, kinds, arcs and durations of our motions against those of the oracle, as far as its four
+/// printed decimals go. Its motions on the spot are passed over.
+Comparison compare(const std::vector<CanonicalMotion>& ours, const OracleRun& oracle);
 
 }  // namespace smoothpost::test

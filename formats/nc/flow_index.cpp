@@ -1,0 +1,298 @@
+#include "formats/nc/flow_index.h"
+
+#include <algorithm>
+#include <tuple>
+#include <unordered_set>
+
+namespace smoothpost::nc {
+namespace {
+
+using Kind = FlowKind;
+constexpr std::uint32_t kNone = FlowStatement::kNone;
+constexpr std::size_t kDeepest = 100;  // loops and branches within each other
+
+const char* keyword_of(Kind kind) {
+  constexpr const char* kNames[] = {"sub",   "endsub", "call",      "return", "while",  "endwhile",
+                                    "do",    "repeat", "endrepeat", "if",     "elseif", "else",
+                                    "endif", "break",  "continue",  "GOTO",   "IF",     "IF",
+                                    "WHILE", "DO",     "END"};
+  return kNames[static_cast<std::size_t>(kind)];
+}
+
+/// What must be open for `kind`: the kinds that it can close or continue.
+bool fits(Kind kind, Kind open) {
+  switch (kind) {
+    case Kind::endsub:
+      return open == Kind::sub;
+    case Kind::endwhile:
+      return open == Kind::loop_while;
+    case Kind::endrepeat:
+      return open == Kind::repeat;
+    case Kind::elseif:
+    case Kind::otherwise:
+    case Kind::endif:
+      return open == Kind::branch_if || open == Kind::elseif ||
+             (open == Kind::otherwise && kind == Kind::endif);
+    case Kind::macro_end:
+      return open == Kind::macro_while || open == Kind::macro_do;
+    default:
+      return false;
+  }
+}
+
+class Pairing {
+ public:
+  explicit Pairing(FlowIndex& index) : index_(index) {}
+
+  void add(FlowStatement statement) {
+    const auto number = static_cast<std::uint32_t>(index_.statements.size());
+    index_.statements.push_back(std::move(statement));
+    switch (now(number).text.kind) {
+      case Kind::sub:
+        return open_sub(number);
+      case Kind::loop_while:
+        if (closes_do(number)) return;
+        return open(number);
+      case Kind::loop_do:
+      case Kind::repeat:
+      case Kind::branch_if:
+      case Kind::macro_while:
+      case Kind::macro_do:
+        return open(number);
+      case Kind::endsub:
+      case Kind::endwhile:
+      case Kind::endrepeat:
+      case Kind::endif:
+      case Kind::macro_end:
+      case Kind::elseif:
+      case Kind::otherwise:
+        return close(number);
+      case Kind::give_back:
+        if (sub_ == kNone) now(number).fault = "return stands in no subroutine";
+        return;
+      case Kind::leave:
+      case Kind::next:
+        return find_loop(number);
+      default:
+        return;
+    }
+  }
+
+  /// A program number of the Fanuc style begins another text.
+  void end_region() {
+    finish();
+    used_.clear();
+  }
+
+  void finish() {
+    for (const std::uint32_t number : open_) unclosed(number);
+    open_.clear();
+    sub_ = kNone;
+  }
+
+ private:
+  FlowStatement& now(std::uint32_t number) { return index_.statements[number]; }
+
+  void unclosed(std::uint32_t number) {
+    // An elseif or else stands for its if.
+    now(number).fault = std::string(keyword_of(now(number).text.kind)) + " has no end";
+  }
+
+  void open(std::uint32_t number) {
+    const bool macro =
+        now(number).text.kind == Kind::macro_while || now(number).text.kind == Kind::macro_do;
+    // Loop numbers of macros are used again and again, but not within each other.
+    bool fresh = true;
+    if (macro) {
+      for (const std::uint32_t other : open_) {
+        fresh = fresh && now(other).text.label != now(number).text.label;
+      }
+    } else {
+      fresh = used_.insert(now(number).text.label).second;
+    }
+    if (!fresh) {
+      now(number).fault = "the label " + now(number).text.label +
+                          " is used before in the same program or subroutine";
+    }
+    if (open_.size() >= kDeepest) {
+      now(number).fault = "more than 100 loops and branches within each other";
+      return;
+    }
+    open_.push_back(number);
+  }
+
+  void open_sub(std::uint32_t number) {
+    FlowStatement& statement = now(number);
+    if (!open_.empty()) {
+      statement.fault = sub_ != kNone ? "a subroutine within a subroutine"
+                                      : "a subroutine within a loop or branch";
+    }
+    if (!index_.subs.emplace(statement.text.label, number).second) {
+      statement.fault = "the subroutine " + statement.text.label + " is defined before";
+    }
+    outer_used_.swap(used_);
+    used_.clear();
+    open_.push_back(number);
+    sub_ = number;
+  }
+
+  bool closes_do(std::uint32_t number) {
+    if (open_.empty()) return false;
+    const std::uint32_t last = open_.back();
+    if (now(last).text.kind != Kind::loop_do || now(last).text.label != now(number).text.label) {
+      return false;
+    }
+    now(number).closes_do = true;
+    pair(last, number);
+    open_.pop_back();
+    return true;
+  }
+
+  void pair(std::uint32_t begin, std::uint32_t end) {
+    now(begin).partner = end;
+    now(end).partner = begin;
+  }
+
+  void close(std::uint32_t number) {
+    FlowStatement& statement = now(number);
+    const Kind kind = statement.text.kind;
+    if (open_.empty()) {
+      statement.fault = std::string(keyword_of(kind)) + " closes nothing";
+      return;
+    }
+    const std::uint32_t last = open_.back();
+    if (!fits(kind, now(last).text.kind) || now(last).text.label != statement.text.label) {
+      statement.fault = std::string(keyword_of(kind)) + " with label " + statement.text.label +
+                        " does not fit the " + keyword_of(now(last).text.kind) + " with label " +
+                        now(last).text.label + " that is open";
+      // What it was meant to close is closed too, so that one fault is one message.
+      while (kind == Kind::endsub && !open_.empty()) pop();
+      return;
+    }
+    if (kind == Kind::elseif || kind == Kind::otherwise) {
+      now(last).partner = number;
+      chain_[number] = chain_.count(last) != 0 ? chain_[last] : last;
+      open_.back() = number;
+      return;
+    }
+    if (kind == Kind::endif) {
+      now(last).partner = number;
+      for (std::uint32_t k = chain_.count(last) != 0 ? chain_[last] : last; k != number;
+           k = now(k).partner) {
+        now(k).end = number;
+      }
+    } else {
+      pair(last, number);
+    }
+    pop();
+  }
+
+  void pop() {
+    if (now(open_.back()).text.kind == Kind::sub) {
+      sub_ = kNone;
+      used_.swap(outer_used_);
+      outer_used_.clear();
+    }
+    open_.pop_back();
+  }
+
+  void find_loop(std::uint32_t number) {
+    FlowStatement& statement = now(number);
+    for (auto it = open_.rbegin(); it != open_.rend(); ++it) {
+      const FlowStatement& loop = now(*it);
+      const bool fits = loop.text.kind == Kind::loop_while || loop.text.kind == Kind::loop_do;
+      if (fits && loop.text.label == statement.text.label) {
+        statement.partner = *it;
+        return;
+      }
+    }
+    statement.fault = std::string(keyword_of(statement.text.kind)) +
+                      " stands in no while or do loop of its label";
+  }
+
+  FlowIndex& index_;
+  std::vector<std::uint32_t> open_;
+  std::unordered_map<std::uint32_t, std::uint32_t> chain_;  ///< elseif, else -> their if
+  std::unordered_set<std::string> used_;
+  std::unordered_set<std::string> outer_used_;
+  std::uint32_t sub_ = kNone;
+};
+
+bool is_oword(Kind kind) { return kind < Kind::macro_goto; }
+
+FlowText read(const Program& program, const Piece& piece) {
+  const std::string_view text = std::string_view(program.text).substr(piece.begin, piece.length);
+  return is_oword(static_cast<Kind>(piece.detail)) ? read_o_line(text) : read_macro_line(text);
+}
+
+}  // namespace
+
+std::uint32_t FlowIndex::of_block(std::uint32_t block) const {
+  const auto found = std::lower_bound(
+      statements.begin(), statements.end(), block,
+      [](const FlowStatement& statement, std::uint32_t value) { return statement.block < value; });
+  return static_cast<std::uint32_t>(found - statements.begin());
+}
+
+std::uint32_t FlowIndex::region_of(std::uint32_t block) const {
+  const auto behind = std::upper_bound(regions.begin(), regions.end(), block);
+  return behind == regions.begin() ? 0 : behind[-1];
+}
+
+std::vector<std::uint32_t> FlowIndex::numbered(std::uint32_t region, long number) const {
+  const auto key = [](const Numbered& n) { return std::tuple(n.region, n.number); };
+  auto it = std::lower_bound(
+      numbers.begin(), numbers.end(), std::tuple(region, number),
+      [&](const Numbered& n, const std::tuple<std::uint32_t, long>& k) { return key(n) < k; });
+  std::vector<std::uint32_t> out;
+  for (; it != numbers.end() && key(*it) == std::tuple(region, number) && out.size() < 2; ++it) {
+    out.push_back(it->block);
+  }
+  return out;
+}
+
+FlowIndex index_flow(const Program& program) {
+  FlowIndex index;
+  Pairing pairing(index);
+  const bool numbers = program.dialect != InputDialect::linuxcnc;
+  std::uint32_t region = 0;
+  for (std::uint32_t b = 0; b < program.blocks.size(); ++b) {
+    const Block& block = program.blocks[b];
+    for (std::uint32_t i = block.first_piece; i < block.first_piece + block.piece_count; ++i) {
+      const Piece& piece = program.pieces[i];
+      if (piece.kind == PieceKind::flow) {
+        FlowStatement statement;
+        statement.text = read(program, piece);
+        statement.block = b;
+        statement.piece = i;
+        pairing.add(std::move(statement));
+      } else if (piece.kind == PieceKind::word && piece.letter == 'O') {
+        region = b;
+        const auto [label, fresh] =
+            index.programs.insert({label_number(piece.value), FlowIndex::ProgramLabel{b, false}});
+        if (!fresh) label->second.twice = true;
+        index.regions.push_back(b);
+        if (numbers) pairing.end_region();
+      } else if (numbers && piece.kind == PieceKind::word && piece.letter == 'N') {
+        index.numbers.push_back({region, label_number(piece.value), b});
+      }
+    }
+  }
+  pairing.finish();
+  std::sort(index.numbers.begin(), index.numbers.end(),
+            [](const FlowIndex::Numbered& a, const FlowIndex::Numbered& b) {
+              return std::tuple(a.region, a.number, a.block) <
+                     std::tuple(b.region, b.number, b.block);
+            });
+  // The end of the loop that break and continue belong to was not known before.
+  for (FlowStatement& statement : index.statements) {
+    const bool leaves = statement.text.kind == Kind::leave || statement.text.kind == Kind::next;
+    if (leaves && statement.partner != kNone) {
+      statement.end = index.statements[statement.partner].partner;
+      if (statement.end == kNone) statement.fault = "the loop has no end";
+    }
+  }
+  return index;
+}
+
+}  // namespace smoothpost::nc

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "formats/nc/expression.h"
+
+namespace smoothpost::nc {
+
+/// What a line of program flow does: the O words of RS274NGC, then the macro statements of the
+/// Fanuc family.
+enum class FlowKind : std::uint8_t {
+  sub,
+  endsub,
+  call,
+  give_back,  ///< return
+  loop_while,
+  endwhile,
+  loop_do,
+  repeat,
+  endrepeat,
+  branch_if,
+  elseif,
+  otherwise,  ///< else
+  endif,
+  leave,  ///< break
+  next,   ///< continue
+  macro_goto,
+  macro_if_goto,
+  macro_if_then,
+  macro_while,
+  macro_do,
+  macro_end
+};
+
+/// A line of program flow, taken apart. Offsets count in the text that was read.
+struct FlowText {
+  static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+
+  FlowKind kind = FlowKind::call;
+  std::string label;                   ///< lower case, no blanks; "100" of o100; loop number of DO
+  std::size_t computed_label = kNone;  ///< o#1, o[#1+2]: where its value begins
+  std::vector<std::size_t> values;     ///< where the condition, count, arguments begin
+  std::size_t target = kNone;          ///< where the number behind GOTO begins
+  std::size_t consequence = kNone;     ///< where the assignment behind THEN begins
+  std::size_t length = 0;              ///< bytes of the whole statement
+  std::string problem;                 ///< empty: it can be read
+  std::size_t at = 0;                  ///< offset of the fault
+  bool ok() const { return problem.empty(); }
+};
+
+/// Arguments of one call of RS274NGC.
+inline constexpr std::size_t kMostArguments = 30;
+
+/// Reads an O-word line of RS274NGC, from its O to its end without comments:
+/// `o<name|n|#p|[e]> keyword [value]...`. Blanks anywhere, any case. Cost: linear.
+FlowText read_o_line(std::string_view text);
+
+/// Whether `text` begins with a macro statement of the Fanuc family: IF, WHILE, GOTO, DO, END.
+bool begins_macro(std::string_view text);
+
+/// Reads one: `IF [..] GOTO n`, `IF [..] THEN #i=v`, `WHILE [..] DO m`, `DO m`, `END m`, `GOTO n`.
+FlowText read_macro_line(std::string_view text);
+
+/// The number that a label or a loop stands for, or that is no such number: -1.
+long label_number(double value);
+
+}  // namespace smoothpost::nc
