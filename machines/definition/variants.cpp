@@ -10,10 +10,21 @@ namespace smoothpost::machine_file {
 namespace {
 
 std::string usual_extension(const std::string& dialect) {
-  static constexpr std::array<std::pair<std::string_view, const char*>, 4> kRows = {
-      {{"krl", "src"}, {"linuxcnc", "ngc"}, {"rapid", "mod"}, {"siemens_840d", "mpf"}}};
+  // a dialect, or the first part of the names of several
+  static constexpr std::array<std::pair<std::string_view, const char*>, 11> kRows = {
+      {{"beckhoff", "nc"},
+       {"fanuc_30i", "nc"},
+       {"fanuc_ls", "ls"},
+       {"grbl", "gcode"},
+       {"heidenhain", "h"},
+       {"krl", "src"},
+       {"linuxcnc", "ngc"},
+       {"rapid", "mod"},
+       {"ros", "yaml"},
+       {"siemens_840d", "mpf"},
+       {"urscript", "script"}}};
   for (const auto& [name, extension] : kRows)
-    if (name == dialect) return extension;
+    if (dialect.compare(0, name.size(), name) == 0) return extension;
   return "txt";
 }
 

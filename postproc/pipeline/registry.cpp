@@ -4,10 +4,17 @@
 #include <array>
 #include <string>
 
+#include "machines/dialects/beckhoff.h"
+#include "machines/dialects/fanuc_30i.h"
+#include "machines/dialects/fanuc_ls.h"
+#include "machines/dialects/grbl.h"
+#include "machines/dialects/heidenhain.h"
 #include "machines/dialects/krl.h"
 #include "machines/dialects/linuxcnc.h"
 #include "machines/dialects/rapid.h"
+#include "machines/dialects/ros_trajectory.h"
 #include "machines/dialects/siemens_840d.h"
+#include "machines/dialects/urscript.h"
 
 namespace smoothpost {
 
@@ -26,8 +33,16 @@ constexpr std::array<InputFormat, 3> kFormats = {{
 std::span<const InputFormat> input_formats() { return kFormats; }
 
 std::span<const Dialect> dialects() {
-  static const std::array<Dialect, 4> rows = {krl::kDialect, linuxcnc::kDialect, rapid::kDialect,
-                                              siemens_840d::kDialect};
+  static const std::array<Dialect, 18> rows = {
+      beckhoff::kDialect,           fanuc_30i::kDialect,
+      fanuc_30i::kVectorDialect,    fanuc_ls::kDialect,
+      grbl::kDialects[0],           grbl::kDialects[1],
+      grbl::kDialects[2],           grbl::kDialects[3],
+      grbl::kDialects[4],           heidenhain::kDialect,
+      heidenhain::kVectorDialect,   krl::kDialect,
+      linuxcnc::kDialect,           rapid::kDialect,
+      ros_trajectory::kRos1Dialect, ros_trajectory::kDialect,
+      siemens_840d::kDialect,       urscript::kDialect};
   return rows;
 }
 

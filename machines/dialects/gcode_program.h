@@ -1,0 +1,79 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "machines/dialects/gcode_text.h"
+#include "machines/dialects/program_printer.h"
+#include "machines/dialects/program_reading.h"
+
+// Printing and reading of programs whose blocks are G-code, for controllers that differ in their
+// words only.
+namespace smoothpost::gcode {
+
+class GcodePrinter : public ProgramPrinter {
+ protected:
+  struct Numbers {
+    std::uint32_t step = 10;
+    std::uint32_t last = 99999;  ///< blocks behind it have no number
+  };
+  GcodePrinter(const MachineDefinition& machine, const MachineProgram& program,
+               AxisWords::Style style, Numbers numbers);
+
+  /// A line with its number, where dialect.line_numbers asks for it.
+  void block(std::string_view words);
+  /// A line of the machine file: without number when it is a comment, % or the program's name.
+  void own_line(const std::string& text);
+  /// (text), in characters that end no comment.
+  void comment(const std::string& text) override;
+  void statement(const std::string& words, const MachineAction& action) override;
+
+  AxisWords& words() { return words_; }
+  const AxisWords& words() const { return words_; }
+  /// F of a block that lasts `seconds`, as one over minutes, with its letter.
+  std::string inverse_time(double seconds) const;
+  bool is_inch() const { return machine().dialect.units == "inch"; }
+
+ private:
+  AxisWords words_;
+  Numbers numbers_;
+  std::uint32_t number_ = 0;
+};
+
+/// Follows blocks. A derived class says what motions and modal words are, and what guards.
+class GcodeReading : public ProgramReading {
+ public:
+  void run(const Parsed& program);
+
+ protected:
+  GcodeReading(const MachineDefinition& machine, const std::string& file);
+  virtual ~GcodeReading() = default;
+
+  /// Takes a block of the guard, before the first motion; false when it is none.
+  virtual bool take_guard(const Block&) { return false; }
+  /// A block with G0, G1, G2 or G3.
+  virtual void read_motion(const Block& block) = 0;
+  /// A block of modal words; false, with nothing changed, when it holds another word.
+  virtual bool read_setting(const Block& block) = 0;
+  /// A block that is not all words; false when it is none of this control's.
+  virtual bool read_statement(const Block&) { return false; }
+  /// Behind the last block.
+  virtual void finish() {}
+
+  /// X Y Z A B C U V W P Q words of the block into the joints, those in `others` left out. `scale`
+  /// makes mm of a length, `shift` is added to X Y Z. False after an error.
+  struct AxisRule {
+    std::string_view others;
+    double scale = 1.0;
+    Vec3 shift = Vec3::Zero();
+  };
+  bool take_axes(const Block& block, const AxisRule& rule);
+  /// A dwell of `seconds`, with an error unless they are a number from 0 on.
+  void dwell(const Block& block, const Word* seconds, double unit);
+
+ private:
+  void read(const Block& block);
+  bool acts_on_motion(const Block& block) const;
+};
+
+}  // namespace smoothpost::gcode

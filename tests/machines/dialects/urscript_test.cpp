@@ -1,0 +1,126 @@
+#include "machines/dialects/urscript.h"
+
+#include "tests/machines/dialects/robot_programs.h"
+
+using namespace smoothpost;
+using namespace smoothpost::test;
+
+namespace {
+
+MachineDefinition arm(std::vector<MachineOverride> more = {}) {
+  more.insert(more.begin(), {"dialect.name", "urscript"});
+  return shipped_machine("robot_6r", more);
+}
+
+}  // namespace
+
+TEST_CASE("urscript: read_back(emit(x)) is x to the printed digits", "[machines][dialects]") {
+  std::mt19937 rng(81);
+  const auto machine = arm();
+  std::size_t rounded = 0;
+  for (int round = 0; round < 400; ++round)
+    rounded += require_same_arm_program(urscript::kDialect, machine,
+                                        random_arm_program(machine, rng, 10), {});
+  CHECK(rounded > 300);
+  const auto joint = arm({{"dialect.mode", "joint"}, {"dialect.digits_deg", "7"}});
+  for (int round = 0; round < 100; ++round) {
+    const auto program = random_joint_program(joint, rng, 10);
+    require_same_arm_program(urscript::kDialect, joint, program, {});
+  }
+}
+
+TEST_CASE("urscript: movep at both sides of a rounded corner, movel elsewhere",
+          "[machines][dialects]") {
+  const auto machine = arm();
+  auto program = short_arm_program(machine);
+  const auto text = emitted(urscript::kDialect, machine, program).text;
+  const std::string target = "(pose_trans(sp_part, p[";
+  CHECK(text.find("movel" + target + "0, 0, 0, 0, 0, 0]), a=1.2, v=0.25)") != std::string::npos);
+  CHECK(text.find("movep" + target + "0.1, 0, 0, 0, 0, 0]), a=1.2, v=0.05, r=0.004)") !=
+        std::string::npos);
+  CHECK(text.find("movep" + target + "0.1, 0.05, 0, 0, 0, 0]), a=1.2, v=0.025, r=0)") !=
+        std::string::npos);
+  const auto back = read_back(urscript::kDialect, machine, text);
+  CHECK(back.moves[2].blend == Approx(4.0));
+  CHECK(back.moves[3].duration == Approx(2.0));
+  // A statement needs a robot that stands.
+  program.actions = {action(MachineAction::Kind::dwell, 3, "", 0.5)};
+  const auto stops = emitted(urscript::kDialect, machine, program).text;
+  CHECK(stops.find("movep") == std::string::npos);
+  CHECK(stops.find("movel" + target + "0.1, 0, 0, 0, 0, 0]), t=2)") != std::string::npos);
+}
+
+TEST_CASE("urscript: events, and those on the fly that stop the robot", "[machines][dialects]") {
+  auto machine = arm();
+  machine.process.events = {{"beam_on", "set_standard_digital_out(1, True)", true, 0.0, 0.0},
+                            {"beam_off", "set_standard_digital_out(1, False)", false, 0.0, 0.0},
+                            {"message", "textmsg(\"{text}\")", true, 0.0, 0.0}};
+  auto program = short_arm_program(machine);
+  program.actions = {event("message", 1, {{"text", "a, \"b\") and (c"}}), event("beam_on", 3),
+                     event("beam_off", 4), action(MachineAction::Kind::dwell, 4, "", 0.25)};
+  const auto out = urscript::emit(machine, program);
+  REQUIRE(out.ok());
+  REQUIRE(out.diagnostics().size() == 1);
+  CHECK(out.diagnostics()[0].code == "PR222");
+  CHECK(out.diagnostics()[0].severity == Severity::warning);
+  const auto back = read_back(urscript::kDialect, machine, out.value().text);
+  REQUIRE(back.events.size() == 4);
+  CHECK(back.events[0].name == "message");
+  CHECK(back.events[1].before == 3);
+  CHECK(back.moves[3].beam);
+  CHECK(back.moves[2].blend == 0.0);
+  CHECK_FALSE(back.events[2].beam);
+  CHECK(back.events[3].seconds == 0.25);
+}
+
+TEST_CASE("urscript: what cannot be printed is refused", "[machines][dialects]") {
+  const auto refused = [](const MachineDefinition& m, const MachineProgram& p, const char* code) {
+    const auto out = urscript::emit(m, p);
+    REQUIRE_FALSE(out.ok());
+    CHECK(out.diagnostics()[0].code == code);
+  };
+  auto machine = arm();
+  auto program = short_arm_program(machine);
+  require_common_rules(urscript::kDialect, machine, program);
+  program.moves.erase(program.moves.begin());
+  refused(machine, program, "PR203");
+  auto named = machine;
+  named.axes[2].name = "J3";
+  refused(named, short_arm_program(machine), "PR202");
+  refused(arm({{"dialect.path_mode", "spline"}}), short_arm_program(machine), "PR203");
+}
+
+TEST_CASE("urscript: what could move differently than certified is refused",
+          "[machines][dialects]") {
+  const auto machine = arm();
+  const auto good = emitted(urscript::kDialect, machine, short_arm_program(machine)).text;
+  const std::vector<std::pair<std::string, std::string>> changes = {
+      {"def smoothpost():", "def smoothpost()"},
+      {"def smoothpost():", "thread smoothpost():"},
+      {"\nend\n", "\n"},
+      {"\nend\n", "\nend\nsmoothpost()\n"},
+      {"  movep", " movep"},
+      {"  movep", "    movep"},
+      {"movep(", "movec("},
+      {"pose_trans(sp_part,", "pose_trans(other,"},
+      {"pose_trans(sp_part, p[0.1, 0, 0, 0, 0, 0])", "p[0.1, 0, 0, 0, 0, 0]"},
+      {"p[0.1, 0, 0, 0, 0, 0]", "p[0.1, 0, 0, 0, 0]"},
+      {"p[0.1, 0, 0, 0, 0, 0]", "p[0.1, 0, 0, 0, 0, 1e3]"},
+      {"p[0.1, 0, 0, 0, 0, 0])", "p[0.1, 0, 0, 0, 0, 0]"},
+      {", v=0.05,", ", v=0,"},
+      {", r=0.004)", ", r=-0.004)"},
+      {", r=0.004)", ")"},
+      {"set_tcp(p[", "set_tcp(p[9"},
+      {"  set_tcp", "  # set_tcp"},
+      {"set_payload(32, ", "set_payload(3, "},
+      {"  sp_part", "  # sp_part"},
+      {"movej([", "movej(p["},
+      {"movel(", "movep("},
+      {"a=0.5, v=0.2", "a=0.5, v=0"},
+      {"  movep", "  while True\n  movep"},
+      {"  movep", "  set_tcp(p[0, 0, 0, 0, 0, 0])\n  movep"},
+  };
+  CHECK(require_refused(urscript::kDialect, machine, good, changes) >= 10);
+  std::mt19937 rng(82);
+  require_bounded(urscript::kDialect, machine, good, rng);
+}
