@@ -71,3 +71,18 @@ function(smoothpost_add_benchmark name)
   target_compile_definitions(bench_${name} PRIVATE
     SMOOTHPOST_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SMOOTHPOST_BINARY_DIR="${PROJECT_BINARY_DIR}")
 endfunction()
+
+# smoothpost_embed_files(postproc/report page FUNCTION page_asset): the files of postproc/report/page become bytes of
+# that component, found by name: std::string_view smoothpost::page_asset(std::string_view name).
+function(smoothpost_embed_files path folder)
+  cmake_parse_arguments(ARG "" "FUNCTION" "" ${ARGN})
+  string(REPLACE "/" "_" name ${path})
+  file(GLOB files CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${path}/${folder}/*)
+  set(made ${PROJECT_BINARY_DIR}/${path}/${folder}_files.cpp)
+  add_custom_command(OUTPUT ${made}
+    COMMAND ${CMAKE_COMMAND} -DOUTPUT=${made} -DFUNCTION=${ARG_FUNCTION} "-DFILES=${files}"
+            -P ${PROJECT_SOURCE_DIR}/cmake/embed_files.cmake
+    DEPENDS ${files} ${PROJECT_SOURCE_DIR}/cmake/embed_files.cmake VERBATIM)
+  target_sources(smoothpost_${name} PRIVATE ${made})
+  set_source_files_properties(${made} PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
+endfunction()

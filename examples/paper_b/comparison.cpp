@@ -5,8 +5,10 @@
 #include <iostream>
 #include <stdexcept>
 
+#include "examples/paper_b/collisions.h"
 #include "examples/paper_b/plots.h"
 #include "kernels/core/units.h"
+#include "kernels/geometry/triangle_tree.h"
 
 namespace smoothpost::paper_b {
 
@@ -155,7 +157,9 @@ int comparison_main(int argc, char** argv, int number) {
     return 2;
   }
   try {
-    compare(Study(read_case(argv[1], number)), argc > 2 ? argv[2] : "");
+    const Study study(read_case(argv[1], number));
+    compare(study, argc > 2 ? argv[2] : "");
+    if (number == 2 && triangle_tree_available()) print_collisions(study);
   } catch (const std::exception& error) {
     std::cerr << error.what() << '\n';
     return 2;

@@ -14,10 +14,6 @@ const ChainJoint& joint_at(const ScrewChain& chain, int joint) {
   return chain.joints[static_cast<std::size_t>(joint)];
 }
 
-bool on_tool_side(const ScrewChain& chain, const SceneBody& body) {
-  return body.joint >= 0 && joint_at(chain, body.joint).side == ChainSide::tool;
-}
-
 /// The joint whose motion moves the body, −1 for none.
 int carrying_joint(const ScrewChain& chain, const SceneBody& body) {
   if (body.joint != SceneBody::kWorkpiece) return body.joint;
@@ -194,31 +190,6 @@ Scene::Data::Pair Scene::Data::prepare(const ScenePair& pair) const {
   if (of_first && of_first->tree->solid() && !pair.exempt)
     out.seeds.of_second = seeds_of(second.shape);
   return out;
-}
-
-std::vector<ScenePair> default_pairs(const ScrewChain& chain, const std::vector<SceneBody>& bodies,
-                                     const PairRules& rules) {
-  require_bodies(chain, bodies);
-  for (const auto& pair : rules.allowed)
-    require(pair.first < bodies.size() && pair.second < bodies.size(), "allowed pairs of bodies");
-  const auto allowed = [&](std::size_t a, std::size_t b) {
-    return std::any_of(rules.allowed.begin(), rules.allowed.end(), [&](const auto& p) {
-      return (p.first == a && p.second == b) || (p.first == b && p.second == a);
-    });
-  };
-  std::vector<ScenePair> pairs;
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    if (!on_tool_side(chain, bodies[i])) continue;
-    for (std::size_t j = 0; j < bodies.size(); ++j) {
-      if (allowed(i, j)) continue;
-      const bool both_tool = on_tool_side(chain, bodies[j]);
-      const bool apart =
-          path_between(chain, bodies[i].joint, std::max(bodies[j].joint, -1)).size() > 1;
-      if (both_tool && (bodies[i].joint <= bodies[j].joint || !apart)) continue;
-      pairs.push_back({.first = i, .second = j, .clearance = rules.clearance, .exempt = {}});
-    }
-  }
-  return pairs;
 }
 
 Scene::Scene(ScrewChain chain, std::vector<SceneBody> bodies, std::vector<ScenePair> pairs) {
@@ -418,6 +389,13 @@ PairMargin Scene::margin(std::size_t pair, const ScenePoses& poses, double want,
   require(pair < pairs().size(), "a pair of the scene");
   require(!std::isnan(want), "a bound that is a number");
   return search(pair, poses, {.want = want}, cache);
+}
+
+PairMargin Scene::decide(std::size_t pair, const ScenePoses& poses, double need) const {
+  require(pair < pairs().size(), "a pair of the scene");
+  require(need >= 0.0, "a need of at least 0");
+  return search(pair, poses, {.want = need + tolerance(pair), .decide = true, .need = need},
+                nullptr);
 }
 
 bool Scene::free(const JointVector& q, SceneCache* cache) const {

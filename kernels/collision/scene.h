@@ -5,7 +5,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "kernels/collision/chain_motion.h"
@@ -53,21 +52,6 @@ struct ScenePair {
   double clearance = 0.0;                             ///< mm, ≥ 0
   std::optional<ExemptSphere> exempt = std::nullopt;  ///< the second body is a mesh
 };
-
-/// What default_pairs() has to know beside the bodies.
-struct PairRules {
-  double clearance = 0.0;  ///< mm, of every pair
-  std::vector<std::pair<std::size_t, std::size_t>> allowed =
-      {};  ///< never checked, in either order
-};
-
-/// The pairs that are checked when nothing is said of single ones: every body of the tool side
-/// against every body of kWorkpiece, of the base and of the workpiece side; and bodies of the tool
-/// side against each other when at least one joint lies between their links' joints. The body of
-/// the tool side is the first (the outer one of two). Sorted by first, then second.
-/// @pre indices and joints in range   @throws ContractViolation if not.
-std::vector<ScenePair> default_pairs(const ScrewChain& chain, const std::vector<SceneBody>& bodies,
-                                     const PairRules& rules);
 
 /// Below this distance bodies count as touching, and a pair that touches is never free, mm.
 inline constexpr double kTouching = 1e-6;
@@ -184,6 +168,11 @@ class Scene {
   /// looked up: see known_margin().   @pre pair < pairs().size(), poses of this scene
   PairMargin margin(std::size_t pair, const ScenePoses& poses, double want,
                     SceneCache* cache = nullptr) const;
+  /// Whether a pair's margin is at least `need` ≥ 0, in less time than margin(): true when `lower`
+  /// says so. A margin below 0 is told by some `upper` below 0, not the least one, and some `lower`
+  /// below 0 that proves nothing; of one above 0 at least half is proven, or `need`, up to
+  /// tolerance().
+  PairMargin decide(std::size_t pair, const ScenePoses& poses, double need) const;
   /// What the cache proves of the margin at `poses` without a search; −∞ when it knows nothing.
   double known_margin(std::size_t pair, const ScenePoses& poses, const SceneCache& cache) const;
   /// The margin of a pair changes by at most this from `from` to `to`, mm (displacement()).

@@ -29,10 +29,11 @@ constexpr double kStretch = 1.5;  // of the time, until a monotone motion is fou
 constexpr double kSlowest = 100.0;
 constexpr double kMonotoneShare = 2e-3;  // relative accuracy of its least time
 
-/// A half-space normal·O ≥ 0.
+/// A half-space normal·O ≥ least.
 struct HalfSpace {
   Vec3 normal;
   std::string_view name;
+  double least = 0.0;
 };
 
 /// The half-spaces of a window with unit normals. The widest cone is the pyramid inside it whose
@@ -54,6 +55,7 @@ std::vector<HalfSpace> half_spaces(const OrientationWindow& w) {
     if (corner > reach)
       list.push_back({(reach * w.normal - c * w.tangent - s * w.binormal).normalized(), "gap"});
   }
+  for (const AxisCut& cut : w.cuts) list.push_back({cut.normal, "clearance", cut.least});
   return list;
 }
 
@@ -198,7 +200,7 @@ class Passes {
     const LocalRow first = local_row(layout, 0, w.u, 0);
     const LocalRow second = local_row(layout, 1, w.u, 0);
     for (const HalfSpace& h : half_spaces(w)) {
-      const double slack = h.normal.dot(axis);
+      const double slack = h.normal.dot(axis) - h.least;
       if (slack > kNear && h.name == "gap") continue;
       const double a = h.normal.dot(slope[0]), b = h.normal.dot(slope[1]);
       NewRow row;
@@ -393,7 +395,7 @@ RateLimits slowed(const RateLimits& limits, double t) {
 
 double OrientationWindow::outside(const Vec3& axis) const {
   double worst = -1.0;
-  for (const HalfSpace& h : half_spaces(*this)) worst = std::max(worst, -h.normal.dot(axis));
+  for (const HalfSpace& h : half_spaces(*this)) worst = std::max(worst, h.least - h.normal.dot(axis));
   return worst;
 }
 

@@ -8,14 +8,22 @@
 
 namespace smoothpost {
 
+/// A half-space that a tool axis O has to lie in, for what is beside the path: normal·O ≥ least.
+struct AxisCut {
+  Vec3 normal = Vec3::UnitZ();  ///< unit
+  double least = -1.0;
+};
+
 /// Where a tool axis may point at one place of a path: O with
-///   tan(low) ≤ (O·T)/(O·N) ≤ tan(high) for lead, likewise O·B for tilt, and angle(O, N) ≤ widest.
+///   tan(low) ≤ (O·T)/(O·N) ≤ tan(high) for lead, likewise O·B for tilt, angle(O, N) ≤ widest, and
+/// inside of every cut.
 struct OrientationWindow {
   double u = 0.0;
   Vec3 normal = Vec3::UnitZ(), tangent = Vec3::UnitX(), binormal = Vec3::UnitY();  ///< N, T, B
   double lead_low = 0.0, lead_high = 0.0;  ///< rad, inside (−π/2, π/2)
   double tilt_low = 0.0, tilt_high = 0.0;
   double widest = 1.5;  ///< rad
+  std::vector<AxisCut> cuts = {};
 
   /// How far O is outside, rad-like: largest violated half-space with unit normal; ≤ 0: inside.
   double outside(const Vec3& axis) const;

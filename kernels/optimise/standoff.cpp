@@ -41,6 +41,8 @@ constexpr std::string_view kRowNames[3][3] = {
     {"velocity of the third linear", "acceleration of the third linear",
      "jerk of the third linear"}};
 
+constexpr std::string_view kBoundName = "clearance";
+
 double limit_of(const RateLimits& limits, int order) {
   if (order == 1) return limits.velocity;
   return order == 2 ? limits.acceleration : limits.jerk;
@@ -105,9 +107,14 @@ void check(const SplineCurve& tip, const SplineCurve& rotary, const StandoffOpti
     for (const RateLimits& limits : settings.linear)
       require(limit_of(limits, order) > 0.0, "optimise_standoff: positive limits");
   }
-  if (!settings.fixed_ends) return;
-  for (const double end : {settings.start, settings.end})
-    require(settings.lower <= end && end <= settings.upper, "optimise_standoff: ends in range");
+  for (const StandoffBound& bound : settings.bounds)
+    require(
+        bound.lower <= bound.upper && tip.knots.first() <= bound.u && bound.u <= tip.knots.last(),
+        "optimise_standoff: bounds on the path that are not crossed");
+  const auto in_range = [&](double q6) { return settings.lower <= q6 && q6 <= settings.upper; };
+  require((!settings.fixed_start || in_range(settings.start)) &&
+              (!settings.fixed_end || in_range(settings.end)),
+          "optimise_standoff: ends in range");
 }
 
 Task task_of(const HeadGeometry& head, const SplineCurve& tip, const SplineCurve& rotary,
@@ -293,14 +300,25 @@ void add_bounds(QuadraticProgram& qp, const Task& task, const StandoffOptions& s
     fix(qp, level, 0, 0.0);
     fix(qp, level, last(level), 0.0);
   }
-  if (!settings.fixed_ends) return;
-  fix(qp, 0, 0, settings.start - task.middle);
-  fix(qp, 0, last(0), settings.end - task.middle);
+  if (settings.fixed_start) fix(qp, 0, 0, settings.start - task.middle);
+  if (settings.fixed_end) fix(qp, 0, last(0), settings.end - task.middle);
+}
+
+/// Bounds of q6 at places of their own, divided by half the range.
+void add_place_rows(std::vector<NewRow>& rows, const SplineLayout& layout, const Task& task,
+                    const StandoffOptions& settings) {
+  for (const StandoffBound& bound : settings.bounds) {
+    LocalRow row = local_row(layout, 0, bound.u, 0);
+    row.weights /= task.half;
+    rows.push_back({std::move(row), (bound.lower - task.middle) / task.half,
+                    (bound.upper - task.middle) / task.half, kBoundName, bound.u});
+  }
 }
 
 /// Limits of the linears at the places, each divided by the limit.
 void add_rows(QuadraticProgram& qp, const Task& task, const StandoffOptions& settings) {
   std::vector<NewRow> rows;
+  add_place_rows(rows, qp.layout, task, settings);
   for (const Place& place : task.row_places) {
     const LocalBasis basis = local_basis(qp.layout, place.u);
     for (int order = 1; order <= 3; ++order) {
@@ -354,8 +372,10 @@ Relaxation time_relaxation(const QuadraticProgram& qp, const StandoffOptions& se
   relaxation.bound_weight =
       (qp.lower.array() < qp.upper.array()).select(relaxation.bound_weight, 0.0).eval();
   relaxation.row_weight.resize(qp.row_count());
-  for (int n = 0; n < qp.row_count(); ++n)
-    relaxation.row_weight[n] = row_limit(qp.row_name[n]).value().order;
+  for (int n = 0; n < qp.row_count(); ++n) {
+    const std::optional<RowLimit> limit = row_limit(qp.row_name[n]);
+    relaxation.row_weight[n] = limit ? limit->order : 0;  // bounds at places do not give way
+  }
   relaxation.lower = -1.0 / kLevels;
   return relaxation;
 }
@@ -400,7 +420,7 @@ StandoffResult optimise_standoff(const HeadGeometry& head, const SplineCurve& ti
   QpSettings solver = settings.solver;
   if (settings.hybrid) solver.solver = QpSolver::banded;
   StandoffResult result;
-  result.q6 = held_at(task.knots, settings.fixed_ends ? settings.start - task.middle : 0.0);
+  result.q6 = held_at(task.knots, settings.fixed_start ? settings.start - task.middle : 0.0);
   result.jerk_before = result.jerk_after = jerk_integral(task, result.q6);
   StandoffOptions tight = settings;
   QuadraticProgram qp;

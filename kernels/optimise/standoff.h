@@ -1,6 +1,7 @@
 #pragma once
 
 #include <limits>
+#include <vector>
 
 #include "kernels/kinematics/head_geometry.h"
 #include "kernels/qp/qp_solver.h"
@@ -16,6 +17,13 @@ struct RateLimits {
   double jerk = std::numeric_limits<double>::infinity();
 };
 
+/// Where q6 has to be at one place of the path, mm; infinity: no limit.
+struct StandoffBound {
+  double u = 0.0;
+  double lower = -std::numeric_limits<double>::infinity();
+  double upper = std::numeric_limits<double>::infinity();
+};
+
 /// Position range, limits and weights of optimise_standoff().
 struct StandoffOptions {
   double lower = 0.0, upper = 0.0;   ///< of q6, mm, the reserve taken off already; lower < upper
@@ -27,8 +35,9 @@ struct StandoffOptions {
   /// costs: makes q6 unique where any parabola is as smooth (constant tool axis).
   double pull = 1e-9;
   bool rest_at_ends = true;       ///< q6' = q6'' = 0 at both ends
-  double start = 0.0, end = 0.0;  ///< q6 at the ends when `fixed_ends`, mm, in range
-  bool fixed_ends = false;
+  double start = 0.0, end = 0.0;  ///< q6 at the ends that are fixed, mm, in range
+  bool fixed_start = false, fixed_end = false;
+  std::vector<StandoffBound> bounds = {};  ///< in any order
   QpSettings solver;
   bool hybrid = false;  ///< banded, then once more by Ipopt (solve_by_hybrid)
 };
@@ -47,13 +56,14 @@ struct StandoffResult {
 /// minimise over a quintic spline q6(u), on the knots of the rotaries,
 ///   Σ_{i=1..3} ∫ (q_i''')² du + ε ∫ (q6''')² du,   q_i = a_i(u) + b_i(u) q6(u) (HeadGeometry),
 /// by 5 Gauss points a piece, under lower ≤ q6 ≤ upper, |q6'|, |q6''|, |q6'''| limits on control
-/// points, |q_i'|, |q_i''|, |q_i'''| limits at places of each piece, and q6' = q6'' = 0 at the
-/// ends. Where a limit of q1 … q3 is exceeded between those places (looked for at 12 places a piece
-/// and the parabolas through them) its rows are narrowed by that share and 2e-4, and the programme
-/// is solved again, at most three times. Convex; tip and tool axis are not touched by any q6.
-/// Guarantees (tests): golden qp_q6 of paper_b.json; limits hold on a dense grid; the tip stays to
-/// 1e-9 mm; not above the held standoff. Units: mm, rad, and u as the knots have it (unit pieces
-/// keep the numbers well conditioned). Cost: linear in the pieces, allocates.
+/// points, |q_i'|, |q_i''|, |q_i'''| limits at places of each piece, the bounds at their places,
+/// and q6' = q6'' = 0 at the ends. Where a limit of q1 … q3 is exceeded between those places
+/// (looked for at 12 places a piece and the parabolas through them) its rows are narrowed by that
+/// share and 2e-4, and the programme is solved again, at most three times. Convex; tip and tool
+/// axis are not touched by any q6. Guarantees (tests): golden qp_q6 of paper_b.json; limits hold on
+/// a dense grid, bounds at their places; the tip stays to 1e-9 mm; not above the held standoff.
+/// Units: mm, rad, and u as the knots have it (unit pieces keep the numbers well conditioned).
+/// Cost: linear in the pieces, allocates.
 /// @param tip 3 components, mm, W   @param rotary 2 components, rad; both on clamped quintic knots
 /// over the same range; `tip` may have other knots.
 /// @pre as said at the parameters; limits > 0, rows_per_span ≥ 1, ε and pull ≥ 0, ends in range

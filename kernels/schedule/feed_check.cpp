@@ -7,7 +7,8 @@
 namespace smoothpost {
 namespace {
 
-constexpr int kPlaces = 40;
+constexpr int kPlaces = 44;  // of an element: 40 evenly, and two more in the first and in
+                             // the last interval
 constexpr double kInterpolated = 1e-6;  // apart, as shares of the limits
 constexpr double kBinding = 0.99;
 constexpr double kNearPeak = 0.9;  // loads from which peaks between places are looked for
@@ -48,29 +49,42 @@ void take(FeedLoad& worst, const PlaceLoad& load) {
   worst.jerk = std::max(worst.jerk, most(load.jerk));
 }
 
+/// Where place i is, as a share of the element.
+double place_share(int i) {
+  constexpr int kEven = kPlaces - 4;
+  constexpr double kStep = 1.0 / (kEven - 1.0);
+  if (i < 3) return 0.25 * i * kStep;
+  if (i >= kPlaces - 3) return 1.0 - 0.25 * (kPlaces - 1 - i) * kStep;
+  return (i - 2) * kStep;
+}
+
 /// Peaks between places: the top of the parabola through three neighbours, the middle one largest.
+/// `ratio`: the second distance over the first.
 double largest_top(const PlaceLoad::Lanes& before, const PlaceLoad::Lanes& at,
-                   const PlaceLoad::Lanes& after) {
+                   const PlaceLoad::Lanes& after, double ratio) {
   double largest = 0.0;
   for (int l = 0; l < kMaxFeedLanes; ++l) {
     const double sign = at[l] < 0.0 ? -1.0 : 1.0;
     const double p = sign * before[l], c = sign * at[l], n = sign * after[l];
     if (c < kNearPeak || c < p || c < n) continue;
-    const double bend = 2.0 * c - p - n;
-    if (bend > 0.0) largest = std::max(largest, c + (n - p) * (n - p) / (8.0 * bend));
+    const double left = c - p, right = (n - c) / ratio;  // slopes; the first distance is 1
+    const double bend = (left - right) / (1.0 + ratio),
+                 slope = (left * ratio + right) / (1.0 + ratio);
+    if (bend > 0.0) largest = std::max(largest, c + slope * slope / (4.0 * bend));
   }
   return largest;
 }
 
-void take_peaks(FeedLoad& worst, const std::array<PlaceLoad, 3>& last, int newest) {
+void take_peaks(FeedLoad& worst, const std::array<PlaceLoad, 3>& last, int newest, double ratio) {
   const PlaceLoad& before = last[(newest + 1) % 3];
   const PlaceLoad& at = last[(newest + 2) % 3];
   const PlaceLoad& after = last[newest];
   worst.velocity =
-      std::max(worst.velocity, largest_top(before.velocity, at.velocity, after.velocity));
-  worst.acceleration = std::max(
-      worst.acceleration, largest_top(before.acceleration, at.acceleration, after.acceleration));
-  worst.jerk = std::max(worst.jerk, largest_top(before.jerk, at.jerk, after.jerk));
+      std::max(worst.velocity, largest_top(before.velocity, at.velocity, after.velocity, ratio));
+  worst.acceleration =
+      std::max(worst.acceleration,
+               largest_top(before.acceleration, at.acceleration, after.acceleration, ratio));
+  worst.jerk = std::max(worst.jerk, largest_top(before.jerk, at.jerk, after.jerk, ratio));
 }
 
 double apart(const PlaceLoad& a, const PlaceLoad& b) {
@@ -89,7 +103,7 @@ class ElementPlaces {
                 const std::vector<double>& controls)
       : stretch_(stretch), grid_(grid), controls_(controls) {
     std::vector<double> shares;
-    for (int i = 0; i < kPlaces; ++i) shares.push_back(i / (kPlaces - 1.0));
+    for (int i = 0; i < kPlaces; ++i) shares.push_back(place_share(i));
     inside_ = interpolation_weights(grid.rule.nodes, shares);
     const auto probes = probe_shares(grid.rule);
     at_probes_ = interpolation_weights(grid.rule.nodes, {probes.begin(), probes.end()});
@@ -103,7 +117,10 @@ class ElementPlaces {
     each(e, [&](double, const PlaceLoad& load) {
       take(worst, load);
       last[seen % 3] = load;
-      if (++seen >= 3) take_peaks(worst, last, (seen - 1) % 3);
+      if (++seen < 3) return;
+      const double at = place_share(seen - 2);
+      take_peaks(worst, last, (seen - 1) % 3,
+                 (place_share(seen - 1) - at) / (at - place_share(seen - 3)));
     });
     return worst;
   }
@@ -114,7 +131,7 @@ class ElementPlaces {
     const FeedElement& element = grid_.elements[e];
     const bool plain = verified(e);
     for (int i = 0; i < kPlaces; ++i) {
-      const double w = grid_.place(element, i / (kPlaces - 1.0));
+      const double w = grid_.place(element, place_share(i));
       visit(w, load(e, w, plain ? interpolated(e, inside_, i) : feed_row(stretch_, element, w)));
     }
   }

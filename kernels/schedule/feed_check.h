@@ -9,12 +9,12 @@
 // Internal to kernels/schedule.
 namespace smoothpost {
 
-/// Largest shares of the limits that b = x(w) uses in every element, on 40 places an element with
+/// Largest shares of the limits that b = x(w) uses in every element, on 44 places an element with
 /// both ends (seen from inside the element).
 ///
-/// The rows at the 40 places are interpolated from those at the collocation points. Two probes an
+/// The rows at the 44 places are interpolated from those at the collocation points. Two probes an
 /// element verify that: where the loads of this very law, from a probe's own row and from the
-/// interpolated one, are more than 1e-6 apart, the path itself is evaluated at all 40 places.
+/// interpolated one, are more than 1e-6 apart, the path itself is evaluated at all 44 places.
 /// Between places, peaks above 0.9 are the tops of parabolas through three neighbours.
 std::vector<FeedLoad> element_loads(const FeedStretch& stretch, const FeedGrid& grid,
                                     const std::vector<double>& controls);

@@ -90,7 +90,7 @@ struct FeedResult {
   FeedStatus status = FeedStatus::empty;
   FeedWitness witness;    ///< unless solved
   FeedProfile profile;    ///< of solved and constant_map; duration 0 else
-  FeedLoad load;          ///< ≤ 1: of the law that is returned, on 40 places an element
+  FeedLoad load;          ///< ≤ 1: of the law that is returned, on 44 places an element
   FeedLoad raw;           ///< before the last dilation
   double dilation = 1.0;  ///< by which all times were stretched last
   int elements = 0, iterations = 0, windows = 0;
@@ -106,7 +106,7 @@ struct FeedResult {
 /// One interior point (solve_feed, in overlapping parts: solve_in_parts) on a coarse grid, then on
 /// one that is even in time and finer where the path's own jerk goes up and down; elements that
 /// overshoot are drawn in, up to three times; at last all times are stretched by the least factor
-/// that brings 40 places an element below every limit, times 1 + margin. Above `window_points`:
+/// that brings 44 places an element below every limit, times 1 + margin. Above `window_points`:
 /// windows of 8 look-aheads. Each starts from a state of the one before, ends at rest (so there is
 /// always a stop), and has limits that sink by 0.3 % to its end; it is kept up to a look-ahead
 /// before its stop. Where no window is found from there the old plan runs on, at last to its stop.

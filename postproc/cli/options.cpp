@@ -24,7 +24,8 @@ void add_machine_options(CLI::App* app, CommandLine& l) {
 
 void add_output_options(CLI::App* app, CommandLine& l) {
   app->add_option("--json", l.json, "write the JSON report to FILE");
-  app->add_option("--report", l.report, "write the report page to FILE (a later version)");
+  app->add_option("--report", l.report, "write the report page, one HTML file, to FILE");
+  app->add_option("--plots", l.plots, "write the plots of the report page as SVG files to DIR");
   app->add_option("--diagnostics", l.diagnostics, "text | json")
       ->check(CLI::IsMember({"text", "json"}));
   app->add_option("--progress", l.progress, "auto | bar | filter | none")
@@ -97,7 +98,7 @@ void add_convert(CLI::App& app, CommandLine& l) {
   c->add_option("--tilt", l.tilt, "the same across the cut, deg; both default to 0: kept");
   c->add_option("--smoothing", l.smoothing, "acr | ramp | none");
   c->add_option("--orientation", l.orientation,
-                "programmed | cone | via | monotone (the last three: lasers)");
+                "programmed | cone | graph | via | monotone (the last four: lasers)");
   c->add_option("--optimise", l.optimise, "jerk (lasers) | none");
   c->add_option("--schedule", l.schedule, "jerk (default) | constant | programmed");
   c->add_option("--links", l.links,
@@ -106,6 +107,51 @@ void add_convert(CLI::App& app, CommandLine& l) {
   c->add_option("--trajectory", l.trajectory,
                 "write joint samples at the machine's cycle to FILE.csv");
   c->add_option("--line-map", l.line_map, "write output line -> input line to FILE.json");
+  c->add_flag("--no-collision-check", l.no_collision_check,
+              "leave the clearance of the machine's bodies unchecked");
+  c->add_flag("--force", l.force, "write a refused program too, marked NOT CERTIFIED");
+  add_output_options(c, l);
+}
+
+void add_finish(CLI::App& app, CommandLine& l) {
+  auto* c = app.add_subcommand("finish", "the mesh of a printed part to a finishing program");
+  c->footer(
+      "Example: the walls of a part that stands 35 mm above the bed, layers 1 mm apart:\n"
+      "  smoothpost finish part.stl -m finish_2p2r_1p1r --work-offset G54=0,0,35 --stock-out "
+      "stock.stl -o out.ngc\n");
+  c->add_option("input", l.input, "the part: an STL, walls to be finished; - for standard input")
+      ->required();
+  add_machine_options(c, l);
+  c->add_option("-o,--output", l.output, "the program; - for standard output");
+  c->add_option("--workpiece-unit", l.workpiece_unit, "unit of the STL: mm | inch");
+  c->add_option("--work-offset", l.work_offset,
+                "G54=x,y,z[,a,b,c]: the part's zero in the machine's workpiece frame, mm and deg")
+      ->take_all()
+      ->allow_extra_args(false);
+  c->add_option("--pitch", l.pitch, "between layers, mm; default 1");
+  c->add_option("--depth", l.depth, "depth of cut, mm; default 0.7: the stock is that much larger");
+  c->add_option("--feed", l.feed, "mm/min; default 600");
+  c->add_option("--rpm", l.rpm, "of the spindle; default 10000");
+  c->add_option("--from", l.from,
+                "height of the first layer, mm; default half a pitch above the foot");
+  c->add_option("--to", l.to, "no layer above, mm; default the top");
+  c->add_option("--lead-in", l.lead_in,
+                "radius of the arcs that lead onto a contour and off it, mm; default 3");
+  c->add_option("--normal-tolerance", l.normal_tolerance,
+                "that the smoothed tool axis may leave the normal by, deg; default 1");
+  c->add_option("--direction", l.direction, "of the layers: alternate (default) | same | helical");
+  c->add_option("--stock-out", l.stock_out, "write the body to be printed to FILE.stl");
+  c->add_option("--tool", l.tool, "N=length: what the end mill is longer than the machine's, mm")
+      ->take_all()
+      ->allow_extra_args(false);
+  c->add_option("--tip-tolerance", l.tip_tolerance, "mm");
+  c->add_option("--axis-tolerance", l.axis_tolerance, "of the program against its path, deg");
+  c->add_option("--dialect", l.dialect, "output dialect instead of the machine's");
+  c->add_option("--schedule", l.schedule, "jerk (default) | constant | programmed");
+  c->add_option("--cuts", l.cuts, "7, 7-40 or 7-: only these cuts, with a start of their own");
+  c->add_option("--trajectory", l.trajectory,
+                "write joint samples at the machine's cycle to FILE.csv");
+  c->add_option("--line-map", l.line_map, "write output line -> path point to FILE.json");
   c->add_flag("--no-collision-check", l.no_collision_check,
               "leave the clearance of the machine's bodies unchecked");
   c->add_flag("--force", l.force, "write a refused program too, marked NOT CERTIFIED");
@@ -161,6 +207,7 @@ Parsed parse_command_line(int argc, char** argv) {
   app.require_subcommand(1);
   add_convert(app, l);
   add_check(app, l);
+  add_finish(app, l);
   add_place(app, l);
   auto* machines =
       add_words(app, l, "machines", "list | show NAME | validate FILE | test-program NAME");

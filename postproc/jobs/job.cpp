@@ -12,9 +12,11 @@
 #include "kernels/geometry/weld.h"
 #include "machines/dialects/decimal.h"
 #include "postproc/jobs/files.h"
+#include "postproc/jobs/finish.h"
 #include "postproc/jobs/golden.h"
 #include "postproc/jobs/machine_commands.h"
 #include "postproc/jobs/place.h"
+#include "postproc/jobs/report_files.h"
 #include "postproc/jobs/settings.h"
 #include "postproc/pipeline/convert.h"
 #include "postproc/pipeline/hash.h"
@@ -43,10 +45,10 @@ class Run {
   Run(const Options& options, const Progress& progress) : options_(options), progress_(progress) {}
 
   JobResult convert_command() {
-    if (!refuse_later_options() || !load_output_machine() || !load_input()) return finish();
+    if (!options_make_sense() || !load_output_machine() || !load_input()) return finish();
     ConvertInput in;
     if (!read_convert_input(in)) return finish();
-    in.timed = !options_.trajectory.empty();
+    in.timed = !options_.trajectory.empty() || wants_page();
     in.collision_check = !options_.no_collision_check;
     std::optional<Conversion> made;
     if (automatic())
@@ -54,33 +56,33 @@ class Run {
     else
       made = convert(in, options_.force, progress_);
     if (!made) return finish();
-    const Conversion& conversion = *made;
-    const ScrewChain chain = placed(in.placement);
-    const double tool_length = in.input.path.points.front().tool_length;
-    context_.cutter_locations = in.input.path.points.size();
-    context_.input_lines = in.input.lines;
-    report(conversion);
-    if (in.timed && !conversion.timeline.items.empty())
-      result_.trajectory =
-          trajectory_csv(conversion.timeline, machine_.definition, chain, tool_length);
-    result_.line_map = line_map_json(conversion.line_map, base_name(input_name_));
-    if (conversion.verdict == Verdict::certified || conversion.verdict == Verdict::forced)
-      result_.program = conversion.program;
-    return finish();
+    return deliver(in, *made);
+  }
+
+  JobResult finish_command() {
+    if (!options_make_sense() || !load_output_machine() || !load_input()) return finish();
+    ConvertInput in;
+    FinishPath path;
+    if (!read_finish_input(in, path)) return finish();
+    in.timed = !options_.trajectory.empty() || wants_page();
+    in.collision_check = !options_.no_collision_check;
+    in.finish = &path;
+    return deliver(in, convert(in, options_.force, progress_));
   }
 
   JobResult place_command() {
-    if (!refuse_later_options() || !load_output_machine() || !load_input()) return finish();
+    if (!options_make_sense() || !load_output_machine() || !load_input()) return finish();
     ConvertInput in;
     if (!read_convert_input(in)) return finish();
     context_.cutter_locations = in.input.path.points.size();
     context_.input_lines = in.input.lines;
-    if (const auto conversion = convert_at_best_place(in, false)) report(*conversion);
+    in.timed = wants_page();
+    if (const auto conversion = convert_at_best_place(in, false)) report(*conversion, shown(in));
     return finish();
   }
 
   JobResult check_command() {
-    if (!refuse_later_options() || !load_output_machine() || !load_input()) return finish();
+    if (!options_make_sense() || !load_output_machine() || !load_input()) return finish();
     CheckInput in;
     std::optional<Pose> placement = read_placement(std::nullopt);
     if (!placement || !read_part(in.part, in.part_name)) return finish();
@@ -97,23 +99,75 @@ class Run {
     context_.input_lines =
         static_cast<std::size_t>(std::count(in.text.begin(), in.text.end(), '\n'));
     context_.program_sha256 = context_.input_sha256;
-    report(check_program(in, progress_));
+    report(check_program(in, progress_),
+           {in.placement, in.against ? &*in.against : nullptr, in.part ? &*in.part : nullptr,
+            in.tool_length, page_text_, in.text});
     return finish();
   }
 
  private:
+  JobResult deliver(const ConvertInput& in, const Conversion& conversion) {
+    const ScrewChain chain = placed(in.placement);
+    const double tool_length = in.input.path.points.front().tool_length;
+    context_.cutter_locations = in.input.path.points.size();
+    context_.input_lines = in.input.lines;
+    report(conversion, shown(in));
+    if (!options_.trajectory.empty() && !conversion.timeline.items.empty())
+      result_.trajectory =
+          trajectory_csv(conversion.timeline, machine_.definition, chain, tool_length);
+    result_.line_map = line_map_json(conversion.line_map, base_name(input_name_));
+    if (conversion.verdict == Verdict::certified || conversion.verdict == Verdict::forced)
+      result_.program = conversion.program;
+    return finish();
+  }
+
+  // The part, the path along its walls, and the stock in the part's place.
+  bool read_finish_input(ConvertInput& in, FinishPath& path) {
+    std::optional<TriangleMesh> part;
+    const auto settings = read_finish_options(options_, machine_.definition.tolerance.tip,
+                                              machine_.definition.tolerance.axis);
+    add(settings.diagnostics());
+    const auto placement = read_placement(std::nullopt);
+    if (!settings.ok() || !placement || !read_mesh(input_bytes_, input_name_, part)) return false;
+    context_.input_format = "stl";
+    auto made = make_finish_path(*part, settings.value(), input_name_, progress_);
+    add(made.diagnostics());
+    if (!made.ok()) return false;
+    path = std::move(made.value());
+    if (!options_.stock_out.empty()) {
+      const Diagnostics errors = write_file(options_.stock_out, stl_bytes(path.stock));
+      add(errors);
+      if (has_error(errors)) return false;
+    }
+    in.input.path = path.path;
+    in.input.reference = "the walls of " + base_name(input_name_) + ", " +
+                         std::to_string(path.layers.size()) + " layers";
+    in.input.lines = path.path.points.size();
+    in.input.assumes.push_back("the part as it was printed is the stock, the part offset by " +
+                               decimal(settings.value().depth, 3) +
+                               " mm; input lines count the points of the path");
+    in.placement = *placement;
+    in.placement_text = placement_text_;
+    in.part = path.stock;
+    in.part_name = input_name_;
+    if (!options_.cuts.empty()) {
+      const auto cuts = parse_cut_range(options_.cuts);
+      add(cuts.diagnostics());
+      if (!cuts.ok()) return false;
+      in.cuts = cuts.value();
+    }
+    in.machine = machine_.definition;
+    in.input_name = input_name_;
+    in.title = title(in);
+    return true;
+  }
+
   void add(Diagnostic d) { result_.diagnostics.push_back(std::move(d)); }
   void add(const Diagnostics& list) {
     result_.diagnostics.insert(result_.diagnostics.end(), list.begin(), list.end());
   }
 
-  // What this version cannot do is refused by name, so that nobody takes silence for a yes.
-  bool refuse_later_options() {
-    const auto refuse = [this](const std::string& value, const char* option) {
-      if (!value.empty())
-        add(usage_error("US122", std::string(option) + " is not possible in this version"));
-    };
-    refuse(options_.report, "--report");
+  bool options_make_sense() {
     if (!options_.links.empty() && options_.links != "plan" && options_.links != "keep")
       add(usage_error("US148", "--links " + options_.links + ": expected is plan or keep"));
     return !has_error(result_.diagnostics);
@@ -170,6 +224,12 @@ class Run {
     context_.version = kVersion;
     context_.timings = options_.timings;
     return true;
+  }
+
+  bool wants_page() const { return !options_.report.empty() || !options_.plots.empty(); }
+
+  PageParts shown(const ConvertInput& in) const {
+    return {in.placement, &in.input, in.part ? &*in.part : nullptr, 0.0, page_text_, {}};
   }
 
   bool automatic() const {
@@ -249,6 +309,7 @@ class Run {
   }
 
   std::optional<InterpretedInput> read_cam_program(const std::string& name, std::string bytes) {
+    if (wants_page()) page_text_ = bytes;
     const InputFormat* format = options_.input_format.empty()
                                     ? format_by_extension(name)
                                     : find_input_format(options_.input_format);
@@ -293,6 +354,10 @@ class Run {
 
   bool input_settings(InputSettings& settings) {
     if (!read_dialect(settings)) return false;
+    if (!options_.input_data && options_.input != "-") {
+      const auto folder = fs::path(options_.input).parent_path();
+      settings.subroutine_folders = {folder.empty() ? "." : folder.string()};
+    }
     auto cl = read_cl_options(options_);
     add(cl.diagnostics());
     if (!cl.ok()) return false;
@@ -385,6 +450,11 @@ class Run {
       }
       bytes = std::move(read.value());
     }
+    return read_mesh(bytes, part_name, part);
+  }
+
+  bool read_mesh(const std::string& bytes, const std::string& name,
+                 std::optional<TriangleMesh>& part) {
     StlSettings settings;
     if (options_.workpiece_unit == "inch") {
       settings.scale = kMillimetresPerInch;
@@ -393,12 +463,12 @@ class Run {
                       "--workpiece-unit " + options_.workpiece_unit + ": expected is mm or inch"));
       return false;
     }
-    const auto stl = read_stl(bytes, part_name, settings);
+    const auto stl = read_stl(bytes, name, settings);
     add(stl.diagnostics());
     if (!stl.ok()) return false;
     part = weld(stl.value().corners);
-    add(mesh_findings(describe(*part), part_name));
-    add(surface_findings(report_surface(*part), part_name));
+    add(mesh_findings(describe(*part), name));
+    add(surface_findings(report_surface(*part), name));
     return true;
   }
 
@@ -438,15 +508,24 @@ class Run {
     return lines;
   }
 
-  void report(const Conversion& conversion) {
+  void report(const Conversion& conversion, const PageParts& parts) {
     add(conversion.diagnostics);
     if (!conversion.program.empty()) context_.program_sha256 = sha256(conversion.program);
     Conversion told = conversion;
     told.diagnostics = result_.diagnostics;
     result_.report = report_json(told, context_);
+    if (wants_page()) make_page(told, parts);
     result_.verdict = to_string(conversion.verdict);
     verdict_ = conversion.verdict;
     summary(conversion);
+  }
+
+  void make_page(const Conversion& conversion, const PageParts& parts) {
+    const bool known = !machine_.definition.axes.empty();
+    ReportPage page = page_of(conversion, context_, known ? &machine_.definition : nullptr, parts,
+                              result_.report);
+    result_.page = std::move(page.html);
+    result_.plots = std::move(page.plots);
   }
 
   void summary(const Conversion& conversion) {
@@ -486,6 +565,7 @@ class Run {
     Conversion none;
     none.diagnostics = result_.diagnostics;
     result_.report = report_json(none, context_);
+    if (wants_page()) make_page(none, {});
     result_.verdict = to_string(Verdict::refused);
     verdict_ = Verdict::refused;
   }
@@ -508,6 +588,12 @@ class Run {
       if (has_error(errors)) result_.status = ExitStatus::usage;
     };
     write(options_.json, result_.report);
+    write(options_.report, result_.page);
+    if (!options_.plots.empty()) {
+      const Diagnostics errors = write_plots(options_.plots, result_.plots);
+      add(errors);
+      if (has_error(errors)) result_.status = ExitStatus::usage;
+    }
     write(options_.line_map, result_.line_map);
     write(options_.trajectory, result_.trajectory);
     if (result_.program.empty() || options_.output == "-") return;
@@ -534,6 +620,7 @@ class Run {
   std::string input_name_;
   std::string input_bytes_;
   std::string placement_text_;
+  std::string page_text_;  ///< of the CAM program, for the page
   ReportContext context_;
   std::optional<Verdict> verdict_;
   bool unreadable_ = false;
@@ -542,6 +629,7 @@ class Run {
 JobResult dispatch(const Options& options, const Progress& progress) {
   if (options.command == "convert") return Run(options, progress).convert_command();
   if (options.command == "check") return Run(options, progress).check_command();
+  if (options.command == "finish") return Run(options, progress).finish_command();
   if (options.command == "place") return Run(options, progress).place_command();
   if (options.command == "machines") return run_machines_command(options);
   if (options.command == "formats") return run_formats_command(options);
@@ -550,7 +638,7 @@ JobResult dispatch(const Options& options, const Progress& progress) {
   result.status = ExitStatus::usage;
   result.diagnostics.push_back(
       usage_error("US100", "unknown command \"" + options.command +
-                               "\": convert, check, place, machines, formats or golden"));
+                               "\": convert, check, finish, place, machines, formats or golden"));
   return result;
 }
 

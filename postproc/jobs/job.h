@@ -1,10 +1,12 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "kernels/core/diagnostic.h"
 #include "kernels/core/progress.h"
 #include "postproc/pipeline/options.h"
+#include "postproc/report/report_plots.h"
 
 namespace smoothpost {
 
@@ -19,6 +21,8 @@ struct JobResult {
   std::string program;       ///< empty unless certified or forced
   std::string program_path;  ///< where it was written; empty: nowhere
   std::string report;        ///< JSON, for convert, check and place
+  std::string page;          ///< HTML, likewise, when options.report or options.plots
+  std::vector<NamedPlot> plots;  ///< of the page
   std::string line_map;      ///< JSON, for convert
   std::string trajectory;    ///< CSV, when options.trajectory
   std::string text;          ///< for people: place, machines, formats, golden

@@ -43,8 +43,19 @@ const std::map<std::string, std::string Options::*>& text_options() {
       {"against", &Options::against},
       {"json", &Options::json},
       {"report", &Options::report},
+      {"plots", &Options::plots},
       {"trajectory", &Options::trajectory},
-      {"line_map", &Options::line_map}};
+      {"line_map", &Options::line_map},
+      {"pitch", &Options::pitch},
+      {"depth", &Options::depth},
+      {"feed", &Options::feed},
+      {"rpm", &Options::rpm},
+      {"from", &Options::from},
+      {"to", &Options::to},
+      {"lead_in", &Options::lead_in},
+      {"normal_tolerance", &Options::normal_tolerance},
+      {"direction", &Options::direction},
+      {"stock_out", &Options::stock_out}};
   return table;
 }
 

@@ -121,27 +121,6 @@ int towards_wrist(const MachineDefinition& machine) {
   return along.dot(machine.tool.axis) > 0.0 ? 1 : -1;
 }
 
-bool retreat_may_free(const ClearanceReport& report, const Scene& scene,
-                      const MachineDefinition& machine) {
-  const int standoff = standoff_joint(machine);
-  if (standoff < 0 || report.places.empty()) return false;
-  const auto is_head = [&](std::size_t body) {
-    const int joint = scene.bodies()[body].joint;
-    return joint >= 0 && joint < standoff &&
-           machine.axes[static_cast<std::size_t>(joint)].joint.side == ChainSide::tool;
-  };
-  const auto is_beside = [&](std::size_t body) {
-    const int joint = scene.bodies()[body].joint;
-    return joint < 0 ||
-           machine.axes[static_cast<std::size_t>(joint)].joint.side == ChainSide::workpiece;
-  };
-  return std::all_of(report.places.begin(), report.places.end(), [&](const ClearancePlace& p) {
-    const ScenePair& pair = scene.pairs()[p.pair];
-    return (is_head(pair.first) && is_beside(pair.second)) ||
-           (is_head(pair.second) && is_beside(pair.first));
-  });
-}
-
 Check clearance_check(const ClearanceReport& report, const Scene& scene, const ReadBack& joints) {
   Check c;
   c.name = "clearance";

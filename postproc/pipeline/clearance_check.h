@@ -68,11 +68,6 @@ double largest_allowance(const std::vector<BlendAllowance>& rounding,
 int standoff_joint(const MachineDefinition& machine);
 int towards_wrist(const MachineDefinition& machine);
 
-/// True when every place of the report is one where something before the standoff axis, seen from
-/// the base, is too near to the part or what is clamped beside it: a longer standoff may free it.
-bool retreat_may_free(const ClearanceReport& report, const Scene& scene,
-                      const MachineDefinition& machine);
-
 /// The check `clearance` of a report: value = distance of the tightest pair, limit = its clearance.
 Check clearance_check(const ClearanceReport& report, const Scene& scene, const ReadBack& joints);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/core/units.h"
 #include "postproc/pipeline/clearance_check.h"
 #include "postproc/pipeline/planned_limits.h"
 #include "postproc/pipeline/process_check.h"
@@ -108,7 +109,6 @@ void add_clearance(const ClearanceInput& in, const Progress& progress, Conversio
   const Scene& scene = *built.value();
   const ClearanceReport report = check_clearance(scene, out.read, in.machine, progress);
   out.checks.push_back(clearance_check(report, scene, out.read));
-  out.retreat_may_free = retreat_may_free(report, scene, in.machine);
   const auto texts = place_texts(report, scene);
   for (std::size_t k = 0; k < texts.size(); ++k)
     out.diagnostics.push_back(
@@ -149,6 +149,19 @@ void add_cut_speed(const MachineDefinition& machine, Conversion& out) {
 }
 
 }  // namespace
+
+void add_input_motion(const MachineDefinition& machine, const std::vector<InputMotion>& motion,
+                      std::vector<AxisSummary>& axes) {
+  for (std::size_t j = 0; j < motion.size(); ++j) {
+    const bool rotary = machine.axes[j].joint.kind == JointKind::rotary;
+    const double scale = rotary ? kDegreesPerRadian : 1.0;
+    InputMotion m = motion[j];
+    m.velocity *= scale;
+    for (auto* value : {&m.acceleration, &m.jerk, &m.rms_jerk})
+      if (*value) **value *= scale;
+    axes[j].input = m;
+  }
+}
 
 void add_planned_limits(const MachineDefinition& machine, Conversion& out) {
   if (out.schedule.peaks.empty()) return;

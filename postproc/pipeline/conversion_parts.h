@@ -89,6 +89,10 @@ Result<ControllerMotion> follow(ReadBack read, const MachineDefinition& machine,
                                 const Inverse& inverse, ToolTurn turn,
                                 const std::function<double(std::size_t)>& tool_length);
 
+/// The input's own motion into the summaries, in their units. Nothing where `motion` is empty.
+void add_input_motion(const MachineDefinition& machine, const std::vector<InputMotion>& motion,
+                      std::vector<AxisSummary>& axes);
+
 /// Adds the checks of the accelerations and jerks of out.schedule (planned_limit_checks) and what
 /// they rest on; does nothing without a schedule.
 void add_planned_limits(const MachineDefinition& machine, Conversion& out);

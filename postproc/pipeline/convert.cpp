@@ -11,21 +11,22 @@
 #include "postproc/pipeline/beam_power.h"
 #include "postproc/pipeline/clearance_check.h"
 #include "postproc/pipeline/controller_blending.h"
+#include "postproc/pipeline/conversion_notes.h"
 #include "postproc/pipeline/conversion_parts.h"
+#include "postproc/pipeline/finish_plan.h"
 #include "postproc/pipeline/joint_plan.h"
+#include "postproc/pipeline/laser_loop.h"
 #include "postproc/pipeline/laser_plan.h"
 #include "postproc/pipeline/machine_program.h"
 #include "postproc/pipeline/process_check.h"
 #include "postproc/pipeline/recipe_check.h"
 #include "postproc/pipeline/registry.h"
 #include "postproc/pipeline/rewind.h"
+#include "postproc/pipeline/standoff_retreat.h"
 
 namespace smoothpost {
 
 namespace {
-
-constexpr double kFirstRetreat = 10.0;  // mm, of a standoff
-constexpr double kLeastStroke = 10.0;   // mm, that is left of it
 
 constexpr int kMostSplitRounds = 30;
 
@@ -107,7 +108,7 @@ class Converter {
     if (!recipe_is_possible() || !has_cuts()) return finish(false);
     tell_links();
     if (beam_part && !register_input()) return finish(false);
-    if (in_.part && !uses_beam()) {
+    if (in_.part && !uses_beam() && !in_.finish) {
       out_.diagnostics.push_back(diagnostic(
           "RG120", "the program has no beam-on motion: it was not compared with the part",
           in_.part_name));
@@ -115,6 +116,7 @@ class Converter {
     }
     const bool made = plan() && emit() && verify();
     describe_input(path_, cuts_, reference_, out_);
+    if (in_.timed) out_.path = path_;
     return finish(made);
   }
 
@@ -140,8 +142,9 @@ class Converter {
   SmoothedPath smoothed() {
     const auto& r = in_.machine.recipe;
     // An optimised cut has its corners rounded by its own splines (fit_tip).
-    if (r.smoothing == "none" || optimises()) return SmoothedPath(reference_);
-    SmoothingSettings s = smoothing_settings();
+    // So has a finishing path before it comes here.
+    if (r.smoothing == "none" || optimises() || in_.finish) return SmoothedPath(reference_);
+    SmoothingSettings s = smoothing_settings(in_.machine);
     if (r.shape == "tuned") tune(s);
     return SmoothedPath(reference_, cuts_, s);
   }
@@ -158,42 +161,11 @@ class Converter {
       settings.tool_length = in_.input.path.points.back().tool_length;
       tuned_ = tune_blend_shape(*inverse_, untuned.runs(), settings);
       watch_.lap("tune");
-      tell_tuning(*tuned_);
+      out_.diagnostics.push_back(
+          tuning_note(*tuned_, in_.machine.recipe.smoothing == "acr", in_.input_name));
     }
     s.shape = tuned_->after.acr;
     s.ramp_c1 = tuned_->after.c1;
-  }
-
-  void tell_tuning(const TuningResult& t) {
-    const auto shape_text = [this](const BlendShape& shape) {
-      return in_.machine.recipe.smoothing == "acr"
-                 ? "kappa " + number(shape.acr.kappa) + ", lambda " + number(shape.acr.lambda)
-                 : "c1 " + number(shape.c1);
-    };
-    out_.diagnostics.push_back(diagnostic(
-        "KN133",
-        "shape of the corners tuned to the joints: " + shape_text(t.before) + " -> " +
-            shape_text(t.after) + ", peak joint jerk at constant feed " +
-            (t.peak_before > 0.0 ? number(100.0 * t.peak_after / t.peak_before) : "100") +
-            " % of before, on the " + std::to_string(t.corners) + " sharpest corners",
-        in_.input_name));
-    out_.diagnostics.back().severity = Severity::note;
-  }
-
-  SmoothingSettings smoothing_settings() const {
-    const auto& r = in_.machine.recipe;
-    const auto& tolerance = in_.machine.tolerance;
-    SmoothingSettings s;
-    s.kind = r.smoothing == "acr" ? BlendKind::acr : BlendKind::ramp;
-    s.shape = {r.kappa, r.lambda};
-    s.paper_shape = r.shape == "paper";
-    s.ramp_c1 = r.ramp_c1;
-    s.merge_tip = tolerance.tip * tolerance.budget.merge;
-    s.merge_axis = tolerance.axis * tolerance.budget.merge;
-    s.corner_tip = tolerance.tip * tolerance.budget.smoothing;
-    s.corner_axis = tolerance.axis * tolerance.budget.smoothing;
-    s.whole_rotation = r.task == "pose";
-    return s;
   }
 
   bool has_cuts() {
@@ -277,14 +249,6 @@ class Converter {
     settings.tip_tolerance = tolerance.tip * tolerance.budget.chord;
     settings.axis_tolerance = tolerance.axis * tolerance.budget.chord;
     settings.held = home_of(in_.machine);
-    if (const int standoff = standoff_joint(in_.machine); standoff >= 0) {
-      const ChainJoint& joint = in_.machine.axes[static_cast<std::size_t>(standoff)].joint;
-      const double reserve = in_.machine.standoff.reserve;
-      if (in_.standoff_retreat > 0.0)
-        settings.held[standoff] =
-            std::clamp(settings.held[standoff] - towards_wrist(in_.machine) * in_.standoff_retreat,
-                       joint.lower + reserve, joint.upper - reserve);
-    }
     settings.file_name = in_.input_name;
     for (const auto& axis : in_.machine.axes) settings.axis_names.push_back(axis.name);
     settings.may_split = in_.machine.links.rewind_in_cut;
@@ -299,15 +263,18 @@ class Converter {
       settings.may_split = round < kMostSplitRounds;
       planned = plan_with(settings);
     }
+    if (planned.ok() && optimises()) tell_stretches();
     tell_splits();
     append(out_.diagnostics, planned.diagnostics());
     watch_.lap("kinematics");
     if (!planned.ok()) return false;
+    tell_clearing();
     out_.corners = smoothed_->corners();
     out_.merged_points = smoothed_->merged_points();
     watch_.lap("corners");
-    tell_posture(planned.value());
+    append(out_.diagnostics, posture_notes(planned.value(), in_.input_name));
     if (!schedule(planned.value())) return false;
+    see_input(settings);
     BuiltProgram built =
         build_program({reference_, cuts_, in_.machine, chain_, part_box(), turn_, &*inverse_},
                       planned.value().samples);
@@ -337,6 +304,19 @@ class Converter {
     return true;
   }
 
+  // What the input itself asks of the joints, for the report.
+  void see_input(JointPlanSettings settings) {
+    if (in_.finish) return;
+    settings.spin_policy = "fixed";
+    settings.may_split = false;
+    const SmoothedPath raw(reference_);
+    const RotaryPair* pair = inverse_->rotary_pair();
+    const auto planned = pair ? plan_joints(raw, *pair, settings, progress_)
+                              : plan_arm(raw, *inverse_->six_r(), settings, progress_);
+    if (planned.ok()) input_motion_ = input_motion(raw, planned.value(), in_.machine.size());
+    watch_.lap("input motion");
+  }
+
   // A program that states its tool frame states one; one that leaves it to the control relies on
   // it.
   bool tools_are_possible() {
@@ -364,18 +344,76 @@ class Converter {
   Result<JointPlan> plan_with(const JointPlanSettings& settings) {
     smoothed_.emplace(smoothed());
     watch_.lap("smooth");
+    if (in_.finish) return finishing();
     if (const RotaryPair* pair = inverse_->rotary_pair()) {
-      auto planned = plan_joints(*smoothed_, *pair, settings, progress_);
+      auto planned = plan_by_pair(settings, *pair);
       if (!optimises() || !planned.ok() || !planned.value().splits.empty()) return planned;
-      return optimised(std::move(planned.value()), *pair);
+      const JointPlan base = planned.value();
+      planned = optimised(base, *pair);
+      if (!planned.ok() || !keeps_programmed_) return planned;
+      // Programmed joints have come into the plan that were to be optimised.
+      const double before = retreat_;
+      auto again = plan_by_pair(settings, *pair, true);
+      if (retreat_ <= before || !again.ok() || !again.value().splits.empty()) return planned;
+      return optimised(std::move(again.value()), *pair);
     }
     return plan_arm(*smoothed_, *inverse_->six_r(), settings, progress_);
+  }
+
+  // With the standoff held where the programmed joints are clear of everything.
+  Result<JointPlan> plan_by_pair(JointPlanSettings settings, const RotaryPair& pair,
+                                 bool whole_cuts = false) {
+    const int standoff = standoff_joint(in_.machine);
+    const double home = standoff < 0 ? 0.0 : settings.held[standoff];
+    if (retreat_ > 0.0) settings.held[standoff] = retreated(in_.machine, home, retreat_);
+    auto planned = plan_joints(*smoothed_, pair, settings, progress_);
+    if (!planned.ok() || !planned.value().splits.empty()) return planned;
+    if (standoff < 0 || !make_scene()) return planned;
+    const auto& samples = planned.value().samples;
+    // The programmes and what comes after them move the rest (keep_clear).
+    const double more = base_retreat(
+        *scene_, in_.machine, pair,
+        optimises() && !whole_cuts ? joined_samples(reference_, cuts_, in_.machine.process, samples)
+                                   : samples_of_cuts(cuts_, samples));
+    if (more <= 0.0) return planned;
+    retreat_ += more;
+    settings.held[standoff] = retreated(in_.machine, home, retreat_);
+    return plan_joints(*smoothed_, pair, settings, progress_);
+  }
+
+  // What must not meet; false: nothing is known that could.
+  bool make_scene() {
+    if (scene_) return true;
+    if (!in_.collision_check) return false;
+    auto built = machine_scene({in_.machine, chain_, in_.part ? &*in_.part : nullptr,
+                                part_ && part_->ok() ? part_->shared_tree() : nullptr,
+                                largest_allowance({}, in_.machine, turn_ != ToolTurn::none)});
+    if (!built.ok()) return false;  // told by the certificate
+    scene_ = std::move(built.value());
+    return scene_.has_value();
+  }
+
+  Result<JointPlan> finishing() {
+    if (!inverse_->rotary_pair())
+      return Result<JointPlan>::failure(
+          diagnostic("KN172", "machine " + in_.machine.name +
+                                  " cannot finish: it is an arm, and a finishing machine has two "
+                                  "rotary and three linear axes and one more that is redundant"));
+    auto planned = plan_finish({*in_.finish, cuts_, in_.machine, *inverse_->rotary_pair(),
+                                in_.input_name, make_scene() ? &*scene_ : nullptr},
+                               progress_);
+    watch_.lap("redundancy");
+    if (!planned.ok()) return Result<JointPlan>::failure(planned.diagnostics());
+    append(out_.diagnostics, finish_notes(planned.value(), in_.machine, in_.input_name));
+    planned_ = std::move(planned.value().paths);
+    return Result<JointPlan>(std::move(planned.value().joints), planned.diagnostics());
   }
 
   // The time of the way to every sample.
   bool schedule(JointPlan& plan) {
     auto scheduled = schedule_plan(
-        {{*smoothed_, plan, laser_paths_, in_.machine}, cuts_, in_.input_name}, progress_);
+        {{*smoothed_, plan, laser_paths_, in_.machine, &planned_}, cuts_, in_.input_name},
+        progress_);
     append(out_.diagnostics, scheduled.diagnostics());
     watch_.lap("schedule");
     if (!scheduled.ok()) return false;
@@ -397,13 +435,14 @@ class Converter {
                          pair,
                          part_ && part_->ok() ? &part_->tree() : nullptr,
                          in_.input_name,
-                         in_.standoff_retreat};
+                         make_scene() ? &*scene_ : nullptr};
     auto result = plan_laser(laser, base, progress_);
     watch_.lap("optimise");
     if (!result.ok()) return Result<JointPlan>::failure(result.diagnostics());
     out_.stretches = std::move(result.value().stretches);
     laser_paths_ = std::move(result.value().paths);
-    tell_stretches();
+    not_clear_ = std::move(result.value().not_clear);
+    keeps_programmed_ = result.value().keeps_programmed;
     JointPlan plan = std::move(base);
     plan.samples = std::move(result.value().joints.samples);
     return Result<JointPlan>(std::move(plan), result.diagnostics());
@@ -431,6 +470,32 @@ class Converter {
            0);
   }
 
+  // What was moved out of the way, and what could not be.
+  void tell_clearing() {
+    const auto note = [this](const char* code, std::string text, std::uint32_t line) {
+      out_.diagnostics.push_back(
+          diagnostic(code, std::move(text), in_.input_name, static_cast<int>(line)));
+      out_.diagnostics.back().severity = Severity::note;
+    };
+    if (retreat_ > 0.0)
+      note("KN157",
+           "the standoff was made " + std::to_string(std::lround(retreat_)) +
+               " mm longer than it would be, so that the head keeps its clearance",
+           0);
+    for (const LaserStretch& stretch : out_.stretches) {
+      const ClearanceLoopReport& r = stretch.clear;
+      if (!r.clear || r.method == "none" || (r.method == "graph" && !scene_)) continue;
+      std::string text = "the head was moved out of the way of what is beside the cut (" +
+                         r.method + ", " + std::to_string(r.passes) + " passes, " +
+                         std::to_string(r.cuts) + " conditions)";
+      if (!r.bodies.empty())
+        text += "; tightest " + number(0.001 * std::round(1000.0 * r.tightest)) +
+                " mm beyond the clearance of " + r.bodies;
+      note("KN158", std::move(text), r.line);
+    }
+    append(out_.diagnostics, not_clear_);
+  }
+
   void split(const std::vector<SplitPlace>& places) {
     for (const auto& place : places) split_lines_.push_back(path_.points[place.segment].line);
     split_cuts(path_, cuts_, in_.input.frames, places, in_.machine.links.over_burn);
@@ -450,45 +515,6 @@ class Converter {
     out_.diagnostics.push_back(diagnostic("LK103", out_.assumes.back(), in_.input_name,
                                           static_cast<int>(split_lines_.front())));
     out_.diagnostics.back().severity = Severity::warning;
-  }
-
-  void tell_posture(const JointPlan& plan) {
-    const auto say = [this](const char* code, Severity severity, std::string text,
-                            std::uint32_t line) {
-      out_.diagnostics.push_back(
-          diagnostic(code, std::move(text), in_.input_name, static_cast<int>(line)));
-      out_.diagnostics.back().severity = severity;
-    };
-    if (plan.spin_gain) {
-      const SpinGain& g = *plan.spin_gain;
-      say("KN131", Severity::note,
-          "rotation about the tool optimised: least margin of the joints " +
-              number(g.margin_before) + " before, " + number(g.margin_after) +
-              " after (share of the range); rms third difference of the joints " +
-              (g.jerk_before > 0.0 ? number(100.0 * g.jerk_after / g.jerk_before) : "100") +
-              " % of before",
-          0);
-    }
-    for (const std::string_view kind : {"wrist", "elbow", "shoulder"}) {
-      double least = 1.0;
-      std::uint32_t nearest = 0;
-      std::string lines;
-      std::size_t count = 0;
-      for (const SingularPlace& place : plan.singular) {
-        if (place.kind != kind) continue;
-        if (place.measure < least) nearest = place.line;
-        least = std::min(least, place.measure);
-        if (++count <= 8) lines += (count > 1 ? ", " : "") + std::to_string(place.line);
-      }
-      if (count == 0) continue;
-      if (count > 8) lines += " and " + std::to_string(count - 8) + " more";
-      say("KN132", Severity::warning,
-          "the arm passes near a singular " + std::string(kind) + " (measure " + number(least) +
-              ", 0 is singular, below 0.05 is told), input lines " + lines +
-              ": joints turn fast there and blocks are slowed to their limits. Another place of "
-              "the part (smoothpost place) or recipe.spin = \"optimised\" may avoid it",
-          nearest);
-    }
   }
 
   std::optional<PartBox> part_box() const {
@@ -556,10 +582,13 @@ class Converter {
           "on moves of the tool the control takes the joints to the nearest solution, from the "
           "joint positions that the program has stated before");
     out_.read = motion.steps ? std::move(*motion.steps) : std::move(motion.read);
+    if (in_.finish)
+      out_.checks.insert(out_.checks.end(), in_.finish->checks.begin(), in_.finish->checks.end());
     out_.checks.insert(out_.checks.end(), deviation.begin(), deviation.end());
     if (part_ && part_->ok()) out_.checks.push_back(part_->output(out_.read, chain_));
     out_.checks.insert(out_.checks.end(), machine.checks.begin(), machine.checks.end());
     out_.axes = std::move(machine.axes);
+    add_input_motion(in_.machine, input_motion_, out_.axes);
     if (in_.collision_check)
       add_clearance(
           {in_.machine, chain_, in_.part ? &*in_.part : nullptr,
@@ -604,13 +633,6 @@ class Converter {
     return std::move(out_);
   }
 
-  static std::string number(double value) {
-    std::string text = std::to_string(value);
-    while (text.back() == '0') text.pop_back();
-    if (text.back() == '.') text.pop_back();
-    return text;
-  }
-
   static std::string describe(const Check& c) {
     std::string text = "check " + c.name + " failed: " + number(c.value) + " " + c.unit +
                        ", limit " + number(c.limit) + " " + c.unit;
@@ -641,8 +663,14 @@ class Converter {
   std::vector<ProcessStates> wanted_states_;
   std::vector<std::uint32_t> split_lines_;
   std::optional<SmoothedPath> smoothed_;
+  std::vector<InputMotion> input_motion_;
   std::optional<TuningResult> tuned_;
   std::vector<LaserPlanPath> laser_paths_;
+  std::vector<PlannedStretch> planned_;  ///< of a finishing path
+  std::optional<Scene> scene_;           ///< what must not meet, once it was asked for
+  double retreat_ = 0.0;                 ///< mm by which the standoff is held longer
+  Diagnostics not_clear_;
+  bool keeps_programmed_ = false;
   std::optional<PowerFollowing> power_;
   std::optional<PartCheck> part_;
   std::optional<Inverse> inverse_;
@@ -653,31 +681,7 @@ class Converter {
 }  // namespace
 
 Conversion convert(const ConvertInput& in, bool force, const Progress& progress) {
-  Conversion first = Converter(in, false, progress).run();
-  if (first.retreat_may_free) {
-    const JointLimits limits = limits_of(in.machine);
-    const int standoff = standoff_joint(in.machine);
-    const double room = limits.upper[standoff] - limits.lower[standoff] -
-                        2.0 * in.machine.standoff.reserve - kLeastStroke;
-    ConvertInput longer = in;
-    double retreat = 0.0;
-    while (retreat < room) {
-      retreat = std::min(std::max(kFirstRetreat, 1.5 * retreat + 5.0), room);
-      longer.standoff_retreat = retreat;
-      Conversion next = Converter(longer, false, progress).run();
-      if (next.verdict == Verdict::certified) {
-        next.diagnostics.push_back(
-            diagnostic("KN157",
-                       "the standoff was made " + std::to_string(std::lround(retreat)) +
-                           " mm longer than it would be, so that the head keeps its clearance",
-                       in.input_name));
-        next.diagnostics.back().severity = Severity::note;
-        return next;
-      }
-    }
-  }
-  return force && first.verdict != Verdict::certified ? Converter(in, true, progress).run()
-                                                      : std::move(first);
+  return Converter(in, force, progress).run();
 }
 
 }  // namespace smoothpost

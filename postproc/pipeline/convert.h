@@ -17,6 +17,8 @@
 
 namespace smoothpost {
 
+struct FinishPath;
+
 /// Everything one conversion needs, already read and validated.
 struct ConvertInput {
   InterpretedInput input;
@@ -32,7 +34,9 @@ struct ConvertInput {
   std::optional<CutRange> cuts;    ///< --cuts: the others are left out
   bool timed = false;              ///< make Conversion::timeline
   bool collision_check = true;     ///< false: --no-collision-check
-  double standoff_retreat = 0.0;   ///< mm, of convert() itself: LaserPlanInput::retreat
+  /// `input` is this path of make_finish_path(), whose joints plan_finish() plans; outlives the
+  /// call
+  const FinishPath* finish = nullptr;
 };
 
 enum class Verdict { certified, limits_only, refused, forced };
@@ -76,9 +80,10 @@ struct Conversion {
   std::vector<LaserStretch> stretches;  ///< of optimise = "jerk", in path order
   FeedSchedule schedule;
   Timeline timeline;  ///< empty unless ConvertInput::timed
+  ToolPath path;      ///< the input's, split where cuts were, as the line map counts its segments;
+                      ///< empty unless ConvertInput::timed
   std::uint32_t merged_points = 0;
   std::size_t links = 0;
-  bool retreat_may_free = false;  ///< the clearance fails where a longer standoff may help
   std::size_t blocks = 0;
   std::vector<StageTime> stages;
 
@@ -88,10 +93,9 @@ struct Conversion {
 /// read -> registration -> kinematics -> emission -> read back -> certificate.
 /// The program is made when it can be made, also when a check fails (the verdict says so); the
 /// caller writes it only when it is certified or forced.
-/// Where only the head before a standoff axis is too near to the part, the conversion is made again
-/// with ever longer standoffs (10 mm, then each 1.5 times the one before and 5 mm more, at last all
-/// but 10 mm of the stroke) until its clearance holds; the first one that is certified is the answer,
-/// told by KN157, else the conversion as it was.
+/// What collides is moved out of the way where the machine may: a standoff axis of the programmed
+/// joints by base_retreat() (KN157), the stretches of an optimised laser by keep_clear() (KN158;
+/// KN159 where that is not possible, and the program is refused).
 Conversion convert(const ConvertInput& in, bool force, const Progress& progress);
 
 struct CheckInput {

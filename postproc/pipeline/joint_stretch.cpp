@@ -22,6 +22,53 @@ constexpr double kJerkError = 1e-4;                               // of a joint'
 constexpr double kFastest = 500.0;   // mm/s, of s, where no feed is programmed
 constexpr double kSamePlace = 1e-6;  // mm or rad, sample and function
 
+/// A laser's path over s.
+class LaserPlanned : public PlannedPath {
+ public:
+  explicit LaserPlanned(LaserJointPath path) : path_(std::move(path)) {}
+  double length() const override { return path_.length; }
+  std::vector<double> breaks() const override {
+    std::vector<double> all = path_.breaks();
+    for (double& b : all) b = path_.length_at(b);
+    return all;
+  }
+  JointVector joints(double s) const override { return path_.joints(parameter(s)); }
+  JointJet jet(double s) const override {
+    JointJet q = path_.jet(parameter(s));
+    double factor = 1.0;
+    for (int order = 1; order < 4; ++order) q.col(order) *= factor *= scale();
+    return q;
+  }
+  VectorJet tip_jet(double s) const override {
+    VectorJet tip = path_.tip_jet(parameter(s));
+    double factor = 1.0;
+    for (int order = 1; order < 4; ++order) tip.col(order) *= factor *= scale();
+    return tip;
+  }
+
+ private:
+  double parameter(double s) const {
+    return std::clamp(path_.parameter_at(s), path_.first(), path_.last());
+  }
+  double scale() const { return (path_.last() - path_.first()) / path_.length; }
+
+  LaserJointPath path_;
+};
+
+std::vector<PlannedStretch> all_planned(const StretchesInput& input) {
+  std::vector<PlannedStretch> all;
+  if (input.planned) all = *input.planned;
+  for (const LaserPlanPath& from : input.laser) {
+    PlannedStretch to{std::make_shared<LaserPlanned>(from.path), from.first_sample, {}};
+    for (const double u : from.u) to.s.push_back(from.path.length_at(u));
+    all.push_back(std::move(to));
+  }
+  std::sort(all.begin(), all.end(), [](const PlannedStretch& a, const PlannedStretch& b) {
+    return a.first_sample < b.first_sample;
+  });
+  return all;
+}
+
 /// Builds the stretches of one plan.
 class StretchBuilder {
  public:
@@ -29,6 +76,7 @@ class StretchBuilder {
       : in_(input),
         samples_(input.plan.samples),
         path_(input.path.reference().path()),
+        planned_(all_planned(input)),
         stops_(path_.points.size(), false) {
     for (const PathEvent& e : path_.events)
       if (is_stop(e)) stops_[e.point] = true;
@@ -57,15 +105,15 @@ class StretchBuilder {
     begin_at(begin);
     std::size_t i = begin + 1;
     while (i < end) {
-      if (const LaserPlanPath* laser = laser_from(i)) {
+      if (const PlannedStretch* planned = planned_from(i)) {
         finish(i - 1, StopCause::corner);
-        add_laser(*laser);
-        i = laser->last_sample() + 1;
+        add_planned(*planned);
+        i = planned->last_sample() + 1;
         begin_at(i - 1);
         continue;
       }
       std::size_t last = i;  // the samples of one leg
-      while (last + 1 < end && samples_[last + 1].leg == samples_[i].leg && !laser_from(last + 1))
+      while (last + 1 < end && samples_[last + 1].leg == samples_[i].leg && !planned_from(last + 1))
         ++last;
       add_leg(i, last);
       i = last + 1;
@@ -93,23 +141,23 @@ class StretchBuilder {
     out_.push_back(std::move(now_));
   }
 
-  // A stretch of the laser whose second sample is `i`.
-  const LaserPlanPath* laser_from(std::size_t i) const {
-    for (const LaserPlanPath& p : in_.laser)
-      if (p.first_sample + 1 == i) return &p;
-    return nullptr;
+  // A planned stretch whose second sample is `i`.
+  const PlannedStretch* planned_from(std::size_t i) const {
+    const auto found = std::lower_bound(
+        planned_.begin(), planned_.end(), i,
+        [](const PlannedStretch& p, std::size_t at) { return p.first_sample + 1 < at; });
+    return found != planned_.end() && found->first_sample + 1 == i ? &*found : nullptr;
   }
 
-  void add_laser(const LaserPlanPath& from) {
+  void add_planned(const PlannedStretch& from) {
     begin_at(from.first_sample);
-    now_.laser = std::make_shared<LaserJointPath>(from.path);
-    for (std::size_t k = 1; k < from.u.size(); ++k)
-      now_.sample_s.push_back(from.path.length_at(from.u[k]));
+    now_.planned = from.path;
+    now_.sample_s.insert(now_.sample_s.end(), from.s.begin() + 1, from.s.end());
     std::size_t sample = from.first_sample + 1;
-    const std::vector<double> breaks = from.path.breaks();
+    const std::vector<double> breaks = from.path->breaks();
     for (std::size_t b = 1; b < breaks.size(); ++b) {
-      now_.breaks.push_back(from.path.length_at(breaks[b]));
-      while (sample < from.last_sample() && from.u[sample - from.first_sample] < breaks[b])
+      now_.breaks.push_back(breaks[b]);
+      while (sample < from.last_sample() && from.s[sample - from.first_sample] < breaks[b])
         ++sample;
       add_piece_data(sample, 0.0);
     }
@@ -416,7 +464,8 @@ class StretchBuilder {
   const StretchesInput& in_;
   const std::vector<JointSample>& samples_;
   const ToolPath& path_;
-  std::vector<bool> stops_;  ///< of path points
+  std::vector<PlannedStretch> planned_;  ///< ascending
+  std::vector<bool> stops_;              ///< of path points
   std::size_t leg_first_ = 0, leg_last_ = 0;
   JointStretch now_;
   std::vector<JointStretch> out_;
@@ -442,23 +491,19 @@ std::size_t JointStretch::piece_at(double s) const {
 }
 
 JointVector JointStretch::joints_at(double s) const {
-  if (laser)
-    return laser->joints(std::clamp(laser->parameter_at(s), laser->first(), laser->last()));
+  if (planned) return planned->joints(s);
   return path.value(path.piece_at(s), s).head(joints);
 }
 
 PathJet JointStretch::jet(std::size_t piece, double s) const {
   PathJet out;
-  if (laser) {
-    const double u = std::clamp(laser->parameter_at(s), laser->first(), laser->last());
-    const double scale = (laser->last() - laser->first()) / laser->length;
-    const JointJet q = laser->jet(u);
-    out.first = scale * q.col(1);
-    out.second = scale * scale * q.col(2);
-    out.third = scale * scale * scale * q.col(3);
-    const auto tip = laser->tip_jet(u);
-    set_tip(out, scale * tip.col(1), scale * scale * tip.col(2),
-            scale * scale * scale * tip.col(3));
+  if (planned) {
+    const JointJet q = planned->jet(s);
+    out.first = q.col(1);
+    out.second = q.col(2);
+    out.third = q.col(3);
+    const VectorJet tip = planned->tip_jet(s);
+    set_tip(out, tip.col(1), tip.col(2), tip.col(3));
     return out;
   }
   const std::size_t low = piece == 0 ? 0 : sub_end[piece - 1];

@@ -9,6 +9,7 @@
 #include "machines/definition/machine.h"
 #include "postproc/pipeline/joint_plan.h"
 #include "postproc/pipeline/laser_plan.h"
+#include "postproc/pipeline/planned_path.h"
 
 // The machine's path between two stops as functions of one parameter, for the feed schedule.
 namespace smoothpost {
@@ -36,9 +37,9 @@ struct JointStretch {
   std::vector<std::uint32_t> line;  ///< of the input, likewise
   std::vector<bool> beam;           ///< on, likewise
 
-  ChebyshevPath path;                  ///< joints, then the tip (3), where there is no `laser`
+  ChebyshevPath path;                  ///< joints, then the tip (3), where nothing is `planned`
   std::vector<std::uint32_t> sub_end;  ///< of each piece: end of its pieces of `path`
-  std::shared_ptr<const LaserJointPath> laser;  ///< null: `path` counts
+  std::shared_ptr<const PlannedPath> planned;  ///< null: `path` counts
 
   int joints = 0;
   double length() const { return breaks.empty() ? 0.0 : breaks.back(); }
@@ -53,6 +54,7 @@ struct StretchesInput {
   const JointPlan& plan;
   const std::vector<LaserPlanPath>& laser;
   const MachineDefinition& machine;
+  const std::vector<PlannedStretch>* planned = nullptr;  ///< of other planners, ascending
 };
 
 /// All stretches of a plan, in path order; links have none. A stretch ends where a run ends, at

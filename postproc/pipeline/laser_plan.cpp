@@ -42,6 +42,7 @@ class LaserPlanner {
         if (!result.ok()) {
           Diagnostics problems = result.diagnostics();
           if (!goes_on(problems)) return Result<LaserPlan>::failure(std::move(problems));
+          plan.keeps_programmed = true;
           append(warnings, problems);
           continue;
         }
@@ -56,6 +57,7 @@ class LaserPlanner {
                               plan.joints.samples.size() - samples.size(),
                               std::move(result.value().u)});
         plan.stretches.push_back(std::move(result.value().report));
+        if (result.value().not_clear) plan.not_clear.push_back(*result.value().not_clear);
       }
       if (!progress_("optimise",
                      static_cast<double>(++done) / static_cast<double>(in_.cuts.size())))
@@ -89,6 +91,39 @@ class LaserPlanner {
 };
 
 }  // namespace
+
+std::vector<JointSample> joined_samples(const ReferencePath& reference,
+                                        const std::vector<Cut>& cuts, const ProcessTable& process,
+                                        const std::vector<JointSample>& base) {
+  std::vector<JointSample> out;
+  for (const Cut& cut : cuts) {
+    if (cut.omitted) continue;
+    const std::vector<StretchRange> ranges = stretches_of(reference, cut, process);
+    std::size_t r = 0;
+    for (const JointSample& s : samples_of_cuts({cut}, base)) {
+      while (r < ranges.size() && ranges[r].last < s.segment) ++r;
+      if (r < ranges.size() && s.segment >= ranges[r].first &&
+          (s.segment < ranges[r].last || s.s < 1.0 || ranges[r].ends_cut))
+        continue;
+      if (s.segment < cut.first && !ranges.empty() && ranges.front().starts_cut) continue;
+      out.push_back(s);
+    }
+  }
+  return out;
+}
+
+std::vector<JointSample> samples_of_cuts(const std::vector<Cut>& cuts,
+                                         const std::vector<JointSample>& base) {
+  std::vector<JointSample> out;
+  for (const Cut& cut : cuts) {
+    if (cut.omitted) continue;
+    for (std::size_t i = 0; i < base.size(); ++i)
+      if ((base[i].segment >= cut.first && base[i].segment <= cut.last) ||
+          (i + 1 < base.size() && base[i].segment < cut.first && base[i + 1].segment >= cut.first))
+        out.push_back(base[i]);
+  }
+  return out;
+}
 
 Result<LaserPlan> plan_laser(const LaserPlanInput& input, const JointPlan& base,
                              const Progress& progress) {

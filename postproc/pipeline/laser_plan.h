@@ -8,6 +8,7 @@
 #include "postproc/pipeline/cutting_frame.h"
 #include "postproc/pipeline/joint_plan.h"
 #include "postproc/pipeline/laser_joint_path.h"
+#include "postproc/pipeline/laser_loop.h"
 
 namespace smoothpost {
 
@@ -43,6 +44,7 @@ struct LaserStretch {
   std::vector<QpReport> qp;
   std::vector<JointPeaks> peaks;  ///< in joint order
   bool normal_from_part = false;
+  ClearanceLoopReport clear;
 };
 
 /// The joints of a planned stretch between the samples that stand for it in a LaserPlan.
@@ -60,6 +62,8 @@ struct LaserPlan {
   JointPlan joints;
   std::vector<LaserStretch> stretches;
   std::vector<LaserPlanPath> paths;  ///< one a stretch
+  Diagnostics not_clear;             ///< KN159: stretches that are not free of collisions, and why
+  bool keeps_programmed = false;     ///< a stretch has the joints of the programmed path
 };
 
 struct LaserPlanInput {
@@ -69,25 +73,36 @@ struct LaserPlanInput {
   const RotaryPair& pair;              ///< of the output chain: tool length 0, part placed
   const TriangleTree* part = nullptr;  ///< in W; nullptr: none
   std::string file_name;               ///< for messages
-  double retreat = 0.0;  ///< mm by which the standoff's range is shorter at the wrist's end
+  const Scene* scene =
+      nullptr;  ///< of `pair`'s chain: what must not meet; nullptr: nothing is known
 };
 
 /// The joints of a laser's cuts, stretch by stretch (stretches_of): the tip smoothed inside the
 /// merge and smoothing shares of its tolerance (fit_tip), the rotaries by minimum jerk inside the
 /// orientation windows (optimise_rotaries) at the largest constant feed that every joint's limits
 /// allow, the standoff by minimum jerk of the linear axes (optimise_standoff), then joint samples
-/// whose straight connection stays inside the chord share.
+/// whose straight connection stays inside the chord share. With a scene each stretch is then kept
+/// clear (keep_clear); recipe.orientation "graph" takes the way of plan_by_graph() at once.
 ///
 /// `base` are the joints of the programmed path: branches, turns and everything outside of the
 /// stretches are theirs. Where a stretch does not start or end its cut its joints are those of
 /// `base`. Limits are the machine's times tolerance.limit_share.
 /// Failures, each with input lines: KN150 a machine that is no such head; KN151 no orientation
 /// keeps the windows; KN152 the programmed feed is too fast (schedule = "programmed"); KN153 the
-/// tip cannot be smoothed inside its tolerance; KN154 a solver broke down.
+/// tip cannot be smoothed inside its tolerance; KN154 a solver broke down; KN159 (graph) no way.
 /// The tip's programmes and all passes are the banded solver's; with recipe.solver = "hybrid" Ipopt
 /// solves the last programmes of rotaries and standoff once more.
 /// Cost: about 0.7 s for 160 control points, 0.1 s of it Ipopt's.
 Result<LaserPlan> plan_laser(const LaserPlanInput& input, const JointPlan& base,
                              const Progress& progress);
+
+/// The base's samples whose joints a plan keeps: where stretches of a cut join, and segments of
+/// cuts that belong to no stretch.
+std::vector<JointSample> joined_samples(const ReferencePath& reference,
+                                        const std::vector<Cut>& cuts, const ProcessTable& process,
+                                        const std::vector<JointSample>& base);
+/// The base's samples of all cuts.
+std::vector<JointSample> samples_of_cuts(const std::vector<Cut>& cuts,
+                                         const std::vector<JointSample>& base);
 
 }  // namespace smoothpost

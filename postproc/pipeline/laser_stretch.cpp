@@ -8,7 +8,6 @@
 #include "kernels/kinematics/inverse.h"
 #include "postproc/pipeline/clearance_check.h"
 #include "postproc/pipeline/conversion_parts.h"
-#include "postproc/pipeline/laser_samples.h"
 #include "postproc/pipeline/orientation_check.h"
 #include "postproc/pipeline/tool_motion.h"
 
@@ -86,29 +85,49 @@ bool StretchPlanner::worth_it() const {
          path_.feed() > 0.0 && std::isfinite(path_.feed());
 }
 
-Result<PlannedStretch> StretchPlanner::run() {
-  using Failure = Result<PlannedStretch>;
+Result<PlannedLaserStretch> StretchPlanner::run() {
+  using Failure = Result<PlannedLaserStretch>;
   if (!fit_any()) return Failure::failure(not_smooth());
-  for (int round = 0;; ++round) {
-    if (auto problem = find_feed()) return Failure::failure(*problem);
-    if (auto problem = settle()) return Failure::failure(*problem);
-    if (keeps_to_input()) break;
-    // Something of the input lies between the stations: once more with closer ones.
-    if (round > 0 || !fit(0.25 * path_.spacing(), 4, true)) return Failure::failure(not_smooth());
-  }
-  PlannedStretch out;
-  out.path = joint_path(standoff_);
+  if (auto problem = solve_any()) return Failure::failure(*problem);
+  PlannedLaserStretch out;
+  if (auto problem = stay_clear(out)) return Failure::failure(*problem);
   sample(out);
   report_.first = in_.range.first;
   report_.last = in_.range.last;
   report_.length = path_.length();
   report_.feed = feed_;
   report_.programmed_feed = path_.feed();
-  report_.control_points = grid_.knots.controls();
+  report_.control_points = out.path.rotary.knots.controls();
   report_.normal_from_part = in_.frames.from_part();
   report_.peaks = peaks_of(out.path, path_, rate_of(feed_));
   out.report = std::move(report_);
   return Failure(std::move(out));
+}
+
+std::optional<Diagnostic> StretchPlanner::solve_at_best_feed() {
+  report_.slowed_by.clear();
+  report_.slowed_lines.clear();
+  if (auto problem = find_feed()) return problem;
+  return settle();
+}
+
+// By the programmes; with "graph" only what they would be given.
+std::optional<Diagnostic> StretchPlanner::solve_any() {
+  const bool graph = machine_.recipe.orientation == "graph";
+  for (int round = 0;; ++round) {
+    if (graph) {
+      feed_ = path_.feed();
+      rotary_ = {grid_.knots, Eigen::MatrixXd::Zero(2, grid_.knots.controls())};
+      standoff_ = held_standoff();
+      report_.qp.clear();
+      for (const QpSolution& s : tip_.solutions) tell("smooth", s);
+    } else if (auto problem = solve_at_best_feed()) {
+      return problem;
+    }
+    if (keeps_to_input(joint_path(standoff_), graph)) return {};
+    // Something of the input lies between the stations: once more with closer ones.
+    if (round > 0 || !fit(0.25 * path_.spacing(), 4, true)) return not_smooth();
+  }
 }
 
 Diagnostic StretchPlanner::not_smooth() const {
@@ -125,12 +144,11 @@ Diagnostic StretchPlanner::not_smooth() const {
 }
 
 // At every point of the input and in the middles between the stations.
-bool StretchPlanner::keeps_to_input() const {
+bool StretchPlanner::keeps_to_input(const LaserJointPath& ours, bool tip_alone) const {
   const auto& t = machine_.tolerance;
   // What sample_path() leaves.
   const double share = 1.0 - 0.85 * t.budget.chord - t.budget.rounding;
-  const bool kept = !orientation_is_free(machine_);
-  const LaserJointPath ours = joint_path(standoff_);
+  const bool kept = !orientation_is_free(machine_) && !tip_alone;
   std::vector<double> places;
   for (std::uint32_t k = in_.range.first; k <= in_.range.last; ++k)
     places.push_back(path_.end_of(k));
@@ -280,12 +298,10 @@ RotaryProblem StretchPlanner::rotary_problem() const {
   if (mode == "via" || mode == "monotone") {
     p.via = vias();
   } else {
-    // As far apart as the cutter locations.
-    double last = -INFINITY;
-    for (std::size_t i = 0; i < grid_.u.size(); ++i) {
-      if (grid_.s[i] - last < 0.9 * path_.spacing() && i + 1 < grid_.u.size()) continue;
-      last = grid_.s[i];
-      p.windows.push_back(window(grid_, i));
+    const std::vector<std::size_t> stations = cutter_stations();
+    for (std::size_t k = 0; k < stations.size(); ++k) {
+      const std::size_t i = stations[k];
+      p.windows.push_back(conditions_.windows.empty() ? window(grid_, i) : conditions_.windows[k]);
       if (near_) {
         const Eigen::VectorXd q = near_->at(grid_.u[i]);
         p.seed.push_back({q[0], q[1]});
@@ -298,6 +314,18 @@ RotaryProblem StretchPlanner::rotary_problem() const {
   return p;
 }
 
+// Stations as far apart as the cutter locations.
+std::vector<std::size_t> StretchPlanner::cutter_stations() const {
+  std::vector<std::size_t> list;
+  double last = -INFINITY;
+  for (std::size_t i = 0; i < grid_.u.size(); ++i) {
+    if (grid_.s[i] - last < 0.9 * path_.spacing() && i + 1 < grid_.u.size()) continue;
+    last = grid_.s[i];
+    list.push_back(i);
+  }
+  return list;
+}
+
 void StretchPlanner::add_end_vias(std::vector<RotaryVia>& via) const {
   if (!in_.range.starts_cut) via.push_back({grid_.u.front(), grid_.programmed.front()});
   if (!in_.range.ends_cut) via.push_back({grid_.u.back(), grid_.programmed.back()});
@@ -306,7 +334,22 @@ void StretchPlanner::add_end_vias(std::vector<RotaryVia>& via) const {
 std::vector<RotaryVia> StretchPlanner::vias() const {
   std::vector<RotaryVia> list;
   for (const std::size_t i : via_stations()) list.push_back({grid_.u[i], grid_.programmed[i]});
+  add_loop_vias(list);
   return list;
+}
+
+// Those of the clearance loop take the place of nearer ones, but for the ends'.
+void StretchPlanner::add_loop_vias(std::vector<RotaryVia>& via) const {
+  const double near = grid_.knots.degree + 1.0;
+  for (const RotaryVia& v : conditions_.via) {
+    if (v.u - grid_.u.front() < near || grid_.u.back() - v.u < near) continue;
+    std::erase_if(via, [&](const RotaryVia& old) {
+      return std::abs(old.u - v.u) < near && old.u > grid_.u.front() && old.u < grid_.u.back();
+    });
+    via.push_back(v);
+  }
+  std::sort(via.begin(), via.end(),
+            [](const RotaryVia& a, const RotaryVia& b) { return a.u < b.u; });
 }
 
 // As the recipe says (mm along the cut), or where the programmed axis leaves great circles between
@@ -378,10 +421,6 @@ StandoffOptions StretchPlanner::standoff_options(double rate) const {
       machine_.standoff.following == Following::none ? 0.0 : machine_.standoff.reserve;
   o.lower = axis.joint.lower + reserve;
   o.upper = axis.joint.upper - reserve;
-  if (towards_wrist(machine_) > 0)
-    o.upper -= in_.laser.retreat;
-  else
-    o.lower += in_.laser.retreat;
   o.standoff = limits_by_parameter(axis, share, rate);
   for (std::size_t i = 0; i < 3; ++i)
     o.linear[i] =
@@ -389,7 +428,11 @@ StandoffOptions StretchPlanner::standoff_options(double rate) const {
   o.solver = settings_.solver;
   o.hybrid = settings_.hybrid;
   o.start = o.end = std::clamp(base_[first_sample_].q[head_.standoff], o.lower, o.upper);
-  o.fixed_ends = !in_.range.starts_cut || !in_.range.ends_cut;
+  const bool joins = !in_.range.starts_cut || !in_.range.ends_cut;
+  // With conditions an end that joins nothing may have to move.
+  o.fixed_start = joins && (!in_.range.starts_cut || conditions_.windows.empty());
+  o.fixed_end = joins && (!in_.range.ends_cut || conditions_.windows.empty());
+  o.bounds = conditions_.bounds;
   return o;
 }
 
@@ -519,15 +562,19 @@ LaserJointPath StretchPlanner::joint_path(SplineCurve standoff) const {
   return {head_, tip_.curve, rotary_, std::move(standoff), base_[first_sample_].q, path_.length()};
 }
 
-void StretchPlanner::sample(PlannedStretch& out) {
+LaserSamples StretchPlanner::sampled(const LaserJointPath& path) const {
   std::vector<double> stops;
   for (const PathEvent& e : in_.laser.reference.path().events)
     if (e.point >= in_.range.first && e.point < in_.range.last)
-      stops.push_back(out.path.parameter_at(path_.end_of(static_cast<std::uint32_t>(e.point))));
-  stops.push_back(out.path.last());
-  LaserSamples samples = sample_path({out.path, path_, in_.laser.pair, machine_, tool_length(),
-                                      base_[first_sample_], std::move(stops)},
-                                     rate_of(feed_));
+      stops.push_back(path.parameter_at(path_.end_of(static_cast<std::uint32_t>(e.point))));
+  stops.push_back(path.last());
+  return sample_path({path, path_, in_.laser.pair, machine_, tool_length(), base_[first_sample_],
+                      std::move(stops)},
+                     rate_of(feed_));
+}
+
+void StretchPlanner::sample(PlannedLaserStretch& out) {
+  LaserSamples samples = sampled(out.path);
   if (samples.rate < rate_of(feed_)) {
     feed_ *= samples.rate / rate_of(feed_);
     note_slow("blocks of cycle.min_block_ms that keep tolerance.budget.chord", 0.0);
@@ -539,8 +586,9 @@ void StretchPlanner::sample(PlannedStretch& out) {
 // ---- messages
 
 Diagnostic StretchPlanner::no_orientation(const QpFeasibility& why) const {
-  const std::string limit = why.name == "bound" ? std::string("the range of a rotary")
-                                                : std::string(why.name) + " tolerance";
+  const std::string limit = why.name == "bound"       ? std::string("the range of a rotary")
+                            : why.name == "clearance" ? std::string("clearance")
+                                                      : std::string(why.name) + " tolerance";
   return diagnostic(
       "KN151",
       "no motion of the rotary axes keeps the tool axis inside its tolerance here, at any feed (" +

@@ -5,7 +5,9 @@
 
 #include "kernels/optimise/rotary_jerk.h"
 #include "kernels/optimise/tip_fit.h"
+#include "postproc/pipeline/laser_loop.h"
 #include "postproc/pipeline/laser_plan.h"
+#include "postproc/pipeline/laser_samples.h"
 #include "postproc/pipeline/laser_stations.h"
 
 namespace smoothpost {
@@ -19,14 +21,15 @@ struct StretchInput {
 };
 
 /// Joint samples of a stretch (the first is its start), and what was found.
-struct PlannedStretch {
+struct PlannedLaserStretch {
   LaserJointPath path;
   std::vector<JointSample> samples;
   std::vector<double> u;  ///< of the path, one a sample
   LaserStretch report;
+  std::optional<Diagnostic> not_clear;  ///< KN159
 };
 
-/// Plans one stretch: tip, rotaries, feed, standoff, samples (plan_laser).
+/// Plans one stretch: tip, rotaries, feed, standoff, clearances, samples (plan_laser).
 class StretchPlanner {
  public:
   /// @param base  joint samples of the programmed path
@@ -37,7 +40,7 @@ class StretchPlanner {
   /// Base samples [first_sample(), end_sample()) are the stretch, its start among them.
   std::size_t first_sample() const { return first_sample_; }
   std::size_t end_sample() const { return end_sample_; }
-  Result<PlannedStretch> run();
+  Result<PlannedLaserStretch> run();
 
  private:
   struct Grid {
@@ -64,7 +67,9 @@ class StretchPlanner {
   RotaryProblem rotary_problem() const;
   std::vector<RotaryVia> vias() const;
   std::vector<std::size_t> via_stations() const;
+  std::vector<std::size_t> cutter_stations() const;
   void add_end_vias(std::vector<RotaryVia>& via) const;
+  void add_loop_vias(std::vector<RotaryVia>& via) const;
   StandoffOptions standoff_options(double rate) const;
   bool standoff_is_held() const;
   SplineCurve held_standoff() const;
@@ -73,14 +78,20 @@ class StretchPlanner {
   std::optional<Diagnostic> finish(RotaryResult rotaries);
   std::optional<Diagnostic> solve_standoff(double rate);
   SlowJoint slow_joint() const;
-  bool keeps_to_input() const;
+  bool keeps_to_input(const LaserJointPath& ours, bool tip_alone = false) const;
+  std::optional<Diagnostic> solve_at_best_feed();
+  std::optional<Diagnostic> solve_any();
+  ClearanceTask clearance_task() const;
+  LoopPlanner loop_planner();
+  std::optional<Diagnostic> stay_clear(PlannedLaserStretch& out);
   Diagnostic not_smooth() const;
   Diagnostic no_orientation(const QpFeasibility& why) const;
   Diagnostic too_fast(double factor) const;
   Diagnostic broke(const char* what, const QpSolution& solution) const;
   void note_slow(const std::string& why, double u);
   LaserJointPath joint_path(SplineCurve standoff) const;
-  void sample(PlannedStretch& out);
+  LaserSamples sampled(const LaserJointPath& path) const;
+  void sample(PlannedLaserStretch& out);
   void tell(const char* name, const QpSolution& solution);
   double tool_length() const {
     return in_.laser.reference.path().points[in_.range.first].tool_length;
@@ -101,6 +112,7 @@ class StretchPlanner {
   std::optional<SplineCurve> near_;   ///< rotaries that were found before, to start from
   std::optional<RotaryResult> here_;  ///< of optimise_rotaries() at feed_, where it is known
   double feed_ = 0.0;                 ///< mm/s
+  ClearanceConditions conditions_;
   LaserStretch report_;
 };
 

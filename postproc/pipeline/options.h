@@ -48,8 +48,19 @@ struct Options {
   std::string against;
   std::string json;
   std::string report;
+  std::string plots;  ///< a folder
   std::string trajectory;
   std::string line_map;
+  std::string pitch;             ///< finish: mm, between layers
+  std::string depth;             ///< finish: mm, depth of cut: the stock is that much larger
+  std::string feed;              ///< finish: mm/min
+  std::string rpm;               ///< finish: of the spindle
+  std::string from;              ///< finish: mm, height of the first layer
+  std::string to;                ///< finish: mm, no layer above
+  std::string lead_in;           ///< finish: mm, radius of the arcs that lead in and out
+  std::string normal_tolerance;  ///< finish: deg, of the tool axis against the surface's normal
+  std::string direction;         ///< finish: alternate | same | helical, of the layers
+  std::string stock_out;         ///< finish: a path for the STL of the body to be printed
   std::vector<std::string> set;  ///< section.key=value
   bool no_collision_check = false;
   bool timings = false;

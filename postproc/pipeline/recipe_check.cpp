@@ -73,10 +73,11 @@ void check_orientation(const MachineDefinition& machine, Refusals& refusals) {
   const bool laser = r.kind == "laser";
   // qi and qi_c2 are what others do, to compare with (examples/paper_b): jerk without bound.
   const bool baseline = r.orientation == "qi" || r.orientation == "qi_c2";
-  if (r.orientation == "graph" || baseline || (r.orientation != "programmed" && !laser))
-    refusals.refuse("recipe.orientation", r.orientation,
-                    laser ? "programmed, cone, via, monotone (qi and qi_c2 are in the examples)"
-                          : "programmed (others are for recipe.kind = \"laser\")");
+  if (baseline || (r.orientation != "programmed" && !laser))
+    refusals.refuse(
+        "recipe.orientation", r.orientation,
+        laser ? "programmed, cone, via, graph, monotone (qi and qi_c2 are in the examples)"
+              : "programmed (others are for recipe.kind = \"laser\")");
   if (!frees_orientation(machine.tolerance)) return;
   if (!laser)
     refusals.refuse("tolerance.lead_deg and tilt_deg", "free",
@@ -99,7 +100,7 @@ void check_laser(const MachineDefinition& machine, Refusals& refusals) {
   const bool optimised = r.optimise == "jerk";
   if (optimised && !laser)
     refusals.refuse("recipe.optimise", r.optimise, "none (jerk is for recipe.kind = \"laser\")");
-  if (laser && !optimised && r.orientation != "programmed" && r.orientation != "graph")
+  if (laser && !optimised && r.orientation != "programmed")
     refusals.refuse("recipe.optimise", r.optimise,
                     "jerk (recipe.orientation = \"" + r.orientation + "\" is planned by it)");
   if (!optimised || !laser) return;

@@ -37,7 +37,7 @@ class TimelineBuilder {
           at_[j] = move.to[j];
       const bool started = known == all;
       known |= move.interpolation == MoveInterpolation::tool ? all : move.joints;
-      if (started) add(move, from);
+      if (started) add(move, from, i);
     }
     for (; action < in_.program.actions.size(); ++action)
       act(in_.program.actions[action], known == all);
@@ -67,8 +67,9 @@ class TimelineBuilder {
     out_.items.push_back(std::move(item));
   }
 
-  void add(const MachineMove& move, const JointVector& from) {
+  void add(const MachineMove& move, const JointVector& from, std::size_t index) {
     TimelineItem item;
+    item.move = static_cast<std::int64_t>(index);
     item.line = move.input_line;
     if (move.role == MoveRole::path) item.segment = move.segment;
     if (move.stretch >= 0) {

@@ -20,6 +20,7 @@ struct TimelineItem {
   bool beam = false;
   std::uint32_t segment = 0;  ///< of the input at its end; 0: a link
   std::uint32_t line = 0;     ///< of the input
+  std::int64_t move = -1;     ///< index of MachineProgram::moves; −1: a dwell
 };
 
 struct Timeline {

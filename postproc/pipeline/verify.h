@@ -7,6 +7,7 @@
 #include "kernels/core/progress.h"
 #include "machines/dialects/dialect.h"
 #include "postproc/pipeline/controller_blending.h"
+#include "postproc/pipeline/input_motion.h"
 #include "postproc/pipeline/line_map.h"
 #include "postproc/pipeline/links.h"
 #include "postproc/pipeline/orientation_check.h"
@@ -26,6 +27,8 @@ struct AxisSummary {
   /// What half a unit of the last printed digit may be in jerk at the shortest block: 8·(half
   /// unit)/time³.
   std::optional<double> rounding_jerk = {};
+  /// What the input asks for when it is run as it is.
+  std::optional<InputMotion> input = {};
   double limit_velocity = 0.0;
   double limit_acceleration = 0.0;
   double limit_jerk = 0.0;

@@ -80,6 +80,34 @@ Json slowed_json(const CutSummary& cut, const Conversion& c) {
   return list;
 }
 
+/// Angles in degrees, lengths in mm; free: at some standoff.
+Json domain_json(const DomainMap& map) {
+  Json j = {{"input_line", map.line}};
+  const auto list = [](const std::vector<double>& values, bool angle) {
+    Json out = Json::array();
+    for (const double v : values) out.push_back(number(angle ? degrees_from_radians(v) : v));
+    return out;
+  };
+  j["lead_deg"] = list(map.leads, true);
+  j["tilt_deg"] = list(map.tilts, true);
+  j["standoff_mm"] = list(map.standoffs, false);
+  Json rows = Json::array();
+  for (std::size_t t = 0; t < map.tilts.size(); ++t) {
+    Json row = Json::array();
+    for (std::size_t l = 0; l < map.leads.size(); ++l)
+      row.push_back(std::any_of(map.cells.begin(), map.cells.end(),
+                                [&](const auto& cells) { return cells[l][t] == '.'; })
+                        ? 1
+                        : 0);
+    rows.push_back(std::move(row));
+  }
+  j["free"] = std::move(rows);
+  j["cells"] = map.cells;
+  j["programmed"] = list({map.programmed[0], map.programmed[1]}, true);
+  if (map.chosen) j["chosen"] = list({(*map.chosen)[0], (*map.chosen)[1]}, true);
+  return j;
+}
+
 /// What was optimised in the cut; nothing when nothing was.
 void add_stretches(const CutSummary& cut, const std::vector<LaserStretch>& stretches, Json& j) {
   int points = 0, via = 0, passes = 0, count = 0;
@@ -108,6 +136,41 @@ void add_stretches(const CutSummary& cut, const std::vector<LaserStretch>& stret
   j["qp"] = std::move(qp);
 }
 
+/// How the cut was kept clear of what is beside it; nothing where nothing was in the way.
+void add_clearing(const CutSummary& cut, const std::vector<LaserStretch>& stretches, Json& j) {
+  Json clear;
+  int passes = 0, conditions = 0, boxes = 0;
+  bool all = true;
+  const ClearanceLoopReport* tightest = nullptr;
+  static const std::vector<std::string> kMethods = {"none", "cuts", "boxes", "via", "graph"};
+  std::ptrdiff_t method = 0;
+  for (const LaserStretch& s : stretches) {
+    const ClearanceLoopReport& r = s.clear;
+    if (s.first < cut.first || s.last > cut.last || (r.passes == 0)) continue;
+    passes += r.passes;
+    conditions += r.cuts;
+    boxes += r.boxes;
+    all = all && r.clear;
+    method =
+        std::max(method, std::find(kMethods.begin(), kMethods.end(), r.method) - kMethods.begin());
+    if (!r.bodies.empty() && (tightest == nullptr || r.tightest < tightest->tightest))
+      tightest = &r;
+  }
+  if (method == 0) return;
+  const auto known = static_cast<std::size_t>(method);
+  clear = {{"method", known < kMethods.size() ? kMethods[known] : ""},
+           {"passes", passes},
+           {"conditions", conditions},
+           {"boxes", boxes},
+           {"clear", all}};
+  if (tightest != nullptr) {
+    clear["tightest_mm"] = number(tightest->tightest);
+    clear["bodies"] = tightest->bodies;
+    clear["input_line"] = tightest->line;
+  }
+  j["clear"] = std::move(clear);
+}
+
 Json cut_json(const CutSummary& c) {
   return {{"label", c.label},
           {"input_lines", {c.first_line, c.last_line}},
@@ -126,6 +189,11 @@ Json axis_json(const AxisSummary& a) {
   const auto known = [](const std::optional<double>& value) {
     return value ? number(*value) : Json(nullptr);
   };
+  Json input = nullptr;
+  if (a.input)
+    input = {{"velocity", number(a.input->velocity)},
+             {"acceleration", known(a.input->acceleration)},
+             {"jerk", known(a.input->jerk)}};
   return {{"name", a.name},
           {"unit", a.unit},
           {"position", {number(a.position_low), number(a.position_high)}},
@@ -138,9 +206,9 @@ Json axis_json(const AxisSummary& a) {
             {"acceleration", number(a.limit_acceleration)},
             {"jerk", number(a.limit_jerk)},
             {"source", a.source}}},
-          {"input_peak", nullptr},
+          {"input_peak", std::move(input)},
           {"rms_jerk", known(a.rms_jerk)},
-          {"input_rms_jerk", nullptr},
+          {"input_rms_jerk", a.input ? known(a.input->rms_jerk) : Json(nullptr)},
           {"rounding_jerk", known(a.rounding_jerk)}};
 }
 
@@ -244,12 +312,17 @@ std::string report_json(const Conversion& c, const ReportContext& context) {
   for (std::size_t i = 0; i < std::min(c.cuts.size(), kMostCuts); ++i) {
     Json& cut = cuts.emplace_back(cut_json(c.cuts[i]));
     add_stretches(c.cuts[i], c.stretches, cut);
+    add_clearing(c.cuts[i], c.stretches, cut);
     if (!c.axes.empty()) cut["slowed_by"] = slowed_json(c.cuts[i], c);
   }
   constexpr std::size_t kMostCorners = 10000;
   j["corners"] = corners_json(c.corners, kMostCorners);
   if (c.corners.size() > kMostCorners) j["corners_in_all"] = c.corners.size();
   j["cuts"] = std::move(cuts);
+  Json maps = Json::array();
+  for (const LaserStretch& stretch : c.stretches)
+    for (const DomainMap& map : stretch.clear.maps) maps.push_back(domain_json(map));
+  if (!maps.empty()) j["domain_maps"] = std::move(maps);
   j["time_s"] = {{"programmed", number(c.programmed_time)},
                  {"scheduled", number(c.scheduled_time)}};
   if (context.placement) j["placement"] = placement_json(*context.placement);

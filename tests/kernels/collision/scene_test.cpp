@@ -56,36 +56,6 @@ Scene mixed_scene() {
 
 }  // namespace
 
-TEST_CASE("scene: default pairs", "[kernels][collision]") {
-  // Joints 0-3 on the tool side, 4-5 on the workpiece side.
-  ScrewChain chain = test::laser_chain();
-  chain.joints[4].side = chain.joints[5].side = ChainSide::workpiece;
-  const auto ball = [](const char* name, int joint) {
-    return SceneBody{
-        .name = name, .joint = joint, .shape = ConvexShape::capsule({0, 0, 0}, {0, 0, 0}, 1.0)};
-  };
-  const std::vector<SceneBody> bodies = {ball("base", SceneBody::kBase),
-                                         ball("x", 0),
-                                         ball("y", 1),
-                                         ball("c", 3),
-                                         ball("table", 5),
-                                         ball("part", SceneBody::kWorkpiece),
-                                         ball("c too", 3)};
-  const auto pairs = default_pairs(chain, bodies, {.clearance = 1.5, .allowed = {{4, 1}, {3, 5}}});
-  std::vector<std::pair<std::size_t, std::size_t>> found;
-  for (const ScenePair& p : pairs) {
-    CHECK(p.clearance == 1.5);
-    CHECK_FALSE(p.exempt);
-    found.emplace_back(p.first, p.second);
-  }
-  // x-y and y-c (z between: not adjacent) differ; x-table and c-part are allowed; bodies of one
-  // link, of the workpiece side and of the base are not checked against each other.
-  const std::vector<std::pair<std::size_t, std::size_t>> expected = {
-      {1, 0}, {1, 5}, {2, 0}, {2, 4}, {2, 5}, {3, 0}, {3, 1},
-      {3, 2}, {3, 4}, {6, 0}, {6, 1}, {6, 2}, {6, 4}, {6, 5}};
-  CHECK(found == expected);
-}
-
 TEST_CASE("scene: margins on moving tables are those of the placed bodies",
           "[kernels][collision]") {
   NEEDS_TREE();
@@ -385,15 +355,45 @@ TEST_CASE("scene: an exempt ball that moves more than its body", "[kernels][coll
   CHECK(more > 50);
 }
 
+TEST_CASE("scene: decide agrees with the margin", "[kernels][collision]") {
+  NEEDS_TREE();
+  const Scene scene = mixed_scene();
+  std::mt19937 random(47);
+  int yes = 0, no = 0;
+  for (int i = 0; i < 400; ++i) {
+    const Vec3 tip(test::uniform(random, -120, 58), test::uniform(random, -80, 80), 1.0);
+    const Vec3 axis = (Vec3::UnitZ() + 0.4 * test::random_vector(random, 1.0)).normalized();
+    const ScenePoses poses =
+        scene.poses(test::laser_joints(tip, axis, test::uniform(random, -100, 20), 0.0));
+    const double need = i % 3 ? test::uniform(random, 0.0, 30.0) : 0.0;
+    for (std::size_t pair = 0; pair < scene.pairs().size(); ++pair) {
+      const PairMargin exact = scene.margin(pair, poses, 200.0);
+      const PairMargin quick = scene.decide(pair, poses, need);
+      if (quick.upper < 0.0)
+        REQUIRE(quick.lower < 0.0);
+      else
+        REQUIRE(quick.lower <= exact.upper + 1e-9);
+      REQUIRE(quick.upper >= std::min(exact.lower, need) - 1e-9);
+      if (exact.lower >= need + 2.0 * scene.tolerance(pair)) {
+        REQUIRE(quick.lower >= need);
+        ++yes;
+      } else if (exact.upper < need) {
+        REQUIRE(quick.lower < need);
+        ++no;
+      }
+    }
+  }
+  CHECK(yes > 300);
+  CHECK(no > 100);
+}
+
 TEST_CASE("scene: bodies of the machine against each other", "[kernels][collision]") {
   // Two arms of a scissor on joints C and B with a joint between them: W is the third.
   ScrewChain chain = test::laser_chain();
   std::vector<SceneBody> bodies = {
       {.name = "arm", .joint = 2, .shape = ConvexShape::capsule({0, 0, 0}, {100, 0, 0}, 5.0)},
       {.name = "hand", .joint = 4, .shape = ConvexShape::capsule({60, 0, 20}, {100, 0, 20}, 5.0)}};
-  const auto pairs = default_pairs(chain, bodies, {.clearance = 1.0, .allowed = {}});
-  REQUIRE(pairs.size() == 1);
-  const Scene scene(chain, bodies, pairs);
+  const Scene scene(chain, bodies, {{.first = 1, .second = 0, .clearance = 1.0}});
   JointVector q = JointVector::Zero(6);
   CHECK(scene.free(q));
   CHECK(scene.clearance(q).margin == Approx(20.0 - 10.0 - 1.0));
@@ -457,9 +457,6 @@ TEST_CASE("scene: preconditions", "[kernels][collision]") {
   auto bad = bodies;
   bad[0].joint = 6;
   CHECK_THROWS_AS(Scene(chain, bad, {}), ContractViolation);
-  CHECK_THROWS_AS(default_pairs(chain, bad, {}), ContractViolation);
-  CHECK_THROWS_AS(default_pairs(chain, bodies, {.clearance = 1.0, .allowed = {{0, 7}}}),
-                  ContractViolation);
   const Scene scene = make({.first = 0, .second = 1, .clearance = 0.0, .exempt = {}});
   CHECK_THROWS_AS(scene.free(JointVector::Zero(5)), ContractViolation);
   CHECK_THROWS_AS(scene.free(JointVector::Constant(6, nan)), ContractViolation);

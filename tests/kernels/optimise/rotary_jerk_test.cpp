@@ -429,6 +429,43 @@ TEST_CASE("rotary_jerk: the widest cone binds where it is narrower", "[kernels][
   CHECK(same.solution.objective == Approx(wide.solution.objective).epsilon(1e-6));
 }
 
+TEST_CASE("rotary_jerk: cuts of the tool axis hold at their windows", "[kernels][optimise]") {
+  Case c(turning_path(0.8), 75, 15.0 * kDegree, 10.0 * kDegree);
+  const RotaryResult before = optimise_rotaries(c.without_limits(), settings());
+  REQUIRE(before.status == RotaryStatus::optimal);
+  const auto axis_of = [&](const SplineCurve& q, double u) {
+    JointVector joints = c.problem.held;
+    joints[3] = q.at(u)[0];
+    joints[4] = q.at(u)[1];
+    return forward_location(c.chain, joints).axis;
+  };
+  // At eleven windows the axis has to lean half the way back to the normal.
+  constexpr std::size_t kFirst = 120, kLast = 130;
+  double most = 0.0;
+  for (std::size_t i = kFirst; i <= kLast; ++i) {
+    OrientationWindow& w = c.problem.windows[i];
+    const Vec3 axis = axis_of(before.q, w.u);
+    const Vec3 side = (w.normal - w.normal.dot(axis) * axis).normalized();
+    w.cuts.push_back({side, 0.5 * side.dot(w.normal)});
+    most = std::max(most, w.outside(axis));
+  }
+  REQUIRE(most > 0.01);
+  c.start_from(before.q);
+  const RotaryResult after = optimise_rotaries(c.without_limits(), settings());
+  INFO(told(after));
+  REQUIRE(after.status == RotaryStatus::optimal);
+  check_windows(c, after.q);
+  for (std::size_t i = kFirst; i <= kLast; ++i) {
+    const OrientationWindow& w = c.problem.windows[i];
+    CHECK(w.cuts.front().normal.dot(axis_of(after.q, w.u)) >= w.cuts.front().least - 1e-9);
+  }
+  CHECK(after.solution.objective > before.solution.objective);
+  // One that leaves no axis is named.
+  c.problem.windows[125].cuts.push_back({-c.problem.windows[125].normal, 0.5});
+  const RotaryResult none = optimise_rotaries(c.at_feed(1.0), settings());
+  CHECK(none.status == RotaryStatus::cone_empty);
+}
+
 TEST_CASE("rotary_jerk: windows that contradict each other", "[kernels][optimise]") {
   Case c(turning_path(0.3), 75, 15.0 * kDegree, 10.0 * kDegree);
   // at one place two windows that have no axis in common

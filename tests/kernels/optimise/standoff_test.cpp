@@ -332,7 +332,7 @@ TEST_CASE("standoff: ends that are given", "[kernels][optimise]") {
   Random random(84);
   const Stretch stretch = random_stretch(random, 40);
   StandoffOptions settings = table_limits(10.0);
-  settings.fixed_ends = true;
+  settings.fixed_start = settings.fixed_end = true;
   settings.start = 3.0;
   settings.end = -20.0;
   const StandoffResult result =
@@ -342,6 +342,40 @@ TEST_CASE("standoff: ends that are given", "[kernels][optimise]") {
   CHECK(std::abs(result.q6.at(0.0)[0] - 3.0) < 1e-9);
   CHECK(std::abs(result.q6.at(40.0)[0] + 20.0) < 1e-9);
   CHECK(result.jerk_before == Approx(stretch.jerk_integral(stretch.held(3.0))).epsilon(1e-5));
+}
+
+TEST_CASE("standoff: bounds at places hold there", "[kernels][optimise]") {
+  Random random(85);
+  const Stretch stretch = random_stretch(random, 40);
+  StandoffOptions settings = table_limits(10.0);
+  const StandoffResult before =
+      optimise_standoff(stretch.head, stretch.tip, stretch.rotary, settings);
+  REQUIRE(before.solution.status == QpStatus::optimal);
+  const double here = before.q6.at(12.3)[0], there = before.q6.at(31.0)[0];
+  // Both towards the middle of the range.
+  const double up = here < -40.0 ? 1.0 : -1.0, down = there < -40.0 ? 1.0 : -1.0;
+  const auto at_least = [](double u, double side, double value) {
+    StandoffBound b;
+    b.u = u;
+    (side > 0.0 ? b.lower : b.upper) = value;
+    return b;
+  };
+  settings.bounds = {at_least(31.0, down, there + 5.0 * down), at_least(12.3, up, here + 4.0 * up)};
+  const StandoffResult after =
+      optimise_standoff(stretch.head, stretch.tip, stretch.rotary, settings);
+  INFO(told(after));
+  REQUIRE(after.solution.status == QpStatus::optimal);
+  CHECK(up * (after.q6.at(12.3)[0] - here) >= 4.0 - 1e-6);
+  CHECK(down * (after.q6.at(31.0)[0] - there) >= 5.0 - 1e-6);
+  CHECK(after.jerk_after >= before.jerk_after);
+  // Two that are too close together for the jerk limit need more time.
+  settings.bounds = {{.u = 20.0, .upper = -80.0}, {.u = 20.5, .lower = 0.0}};
+  const StandoffTimeFactor time =
+      least_standoff_time(stretch.head, stretch.tip, stretch.rotary, settings);
+  CHECK((!time.found || time.factor > 1.0));
+  settings.bounds = {{.u = 20.0, .lower = 5.0, .upper = 4.0}};
+  CHECK_THROWS_AS(optimise_standoff(stretch.head, stretch.tip, stretch.rotary, settings),
+                  ContractViolation);
 }
 
 TEST_CASE("standoff: constant tool axis", "[kernels][optimise]") {
@@ -418,7 +452,7 @@ TEST_CASE("standoff: the time factor is the least", "[kernels][optimise]") {
   for (int n = 0; n < 6; ++n) {
     const Stretch stretch = random_stretch(random, 30);
     StandoffOptions settings = table_limits(200.0);
-    settings.fixed_ends = n % 2 == 0;  // then q6 itself has to move
+    settings.fixed_start = settings.fixed_end = n % 2 == 0;  // then q6 itself has to move
     settings.start = -90.0;
     settings.end = 15.0;
     const StandoffTimeFactor least =
@@ -511,7 +545,7 @@ TEST_CASE("standoff: preconditions", "[kernels][optimise]") {
   refused([](Stretch&, StandoffOptions& o) { o.standoff.jerk = 0.0; });
   refused([](Stretch&, StandoffOptions& o) { o.linear[1].velocity = 0.0; });
   refused([](Stretch&, StandoffOptions& o) {
-    o.fixed_ends = true;
+    o.fixed_start = o.fixed_end = true;
     o.start = 21.0;
   });
 }

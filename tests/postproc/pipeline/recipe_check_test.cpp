@@ -62,7 +62,7 @@ TEST_CASE("recipe_check: what a laser can do", "[postproc][pipeline]") {
   CHECK(laser({}).empty());
   CHECK(laser({kJerk}).empty());
   CHECK(laser({kJerk, {"recipe.schedule", "constant"}}).empty());
-  for (const char* orientation : {"cone", "via", "monotone"}) {
+  for (const char* orientation : {"cone", "via", "graph", "monotone"}) {
     CHECK(laser({kJerk, {"recipe.orientation", orientation}}).empty());
     CHECK(laser({kJerk, kLead, kTilt, {"recipe.orientation", orientation}}).empty());
     CHECK(laser({kJerk, kTilt, {"recipe.orientation", orientation}}).empty());
@@ -93,9 +93,9 @@ TEST_CASE("recipe_check: orientations of lasers and of a later version", "[postp
     CHECK(count(text) == 1);
     says(text, "US120: recipe.orientation = \"" + std::string(orientation) + "\"");
   }
-  for (const char* orientation : {"graph", "qi", "qi_c2"})
+  for (const char* orientation : {"qi", "qi_c2"})
     says(laser({kJerk, {"recipe.orientation", orientation}}),
-         "possible: programmed, cone, via, monotone (qi and qi_c2 are in the examples)");
+         "possible: programmed, cone, via, graph, monotone (qi and qi_c2 are in the examples)");
   says(laser({kCone}), "US120: recipe.optimise = \"none\"");  // nothing would carry it out
 }
 

@@ -59,7 +59,7 @@ typedef int (*smoothpost_progress)(void* user, const char* stage, double share);
 /* Every option of the command line under its name there; NULL or 0 means not given. */
 typedef struct smoothpost_options {
   size_t size; /* sizeof(smoothpost_options) of the caller; set by smoothpost_options_init */
-  const char* command;          /* convert | check | place | machines | formats | golden */
+  const char* command;          /* convert | check | finish | place | machines | formats | golden */
   const char* const* arguments; /* words after the command: list, show NAME, run DIR */
   size_t argument_count;
   const char* input; /* a path; with input_data only a name for messages */
@@ -112,6 +112,17 @@ typedef struct smoothpost_options {
   const char* input_feed; /* cl: mm/min, of feed motions before FEDRAT */
   const char* cl_frames;  /* cl: one | reported | applied */
   const char* cl_circles; /* cl: tangents | cw | ccw */
+  const char* plots; /* a folder for the plots of the report page, as SVG files */
+  const char* pitch; /* finish: mm, between layers */
+  const char* depth; /* finish: mm, depth of cut: the stock is that much larger */
+  const char* feed; /* finish: mm/min */
+  const char* rpm; /* finish: of the spindle */
+  const char* from; /* finish: mm, height of the first layer */
+  const char* to; /* finish: mm, no layer above */
+  const char* lead_in; /* finish: mm, radius of the arcs that lead in and out */
+  const char* normal_tolerance; /* finish: deg, of the tool axis against the surface's normal */
+  const char* direction; /* finish: alternate | same | helical, of the layers */
+  const char* stock_out; /* finish: a path for the STL of the body to be printed */
 } smoothpost_options;
 
 /* All members to "not given". `size` is sizeof(smoothpost_options) as the caller knows it. */
