@@ -150,16 +150,7 @@ class Run {
     in.placement_text = placement_text_;
     in.part = path.stock;
     in.part_name = input_name_;
-    if (!options_.cuts.empty()) {
-      const auto cuts = parse_cut_range(options_.cuts);
-      add(cuts.diagnostics());
-      if (!cuts.ok()) return false;
-      in.cuts = cuts.value();
-    }
-    in.machine = machine_.definition;
-    in.input_name = input_name_;
-    in.title = title(in);
-    return true;
+    return complete(in);
   }
 
   void add(Diagnostic d) { result_.diagnostics.push_back(std::move(d)); }
@@ -236,9 +227,8 @@ class Run {
     return options_.work_offset.size() == 1 && options_.work_offset.front() == "auto";
   }
 
-  bool read_convert_input(ConvertInput& in) {
-    if (!read_program(in) || !place(in) || !read_part(in.part, in.part_name)) return false;
-    in.keep_links = options_.links == "keep";
+  /// What every conversion has besides its path.
+  bool complete(ConvertInput& in) {
     if (!options_.cuts.empty()) {
       const auto cuts = parse_cut_range(options_.cuts);
       add(cuts.diagnostics());
@@ -249,6 +239,12 @@ class Run {
     in.input_name = input_name_;
     in.title = title(in);
     return true;
+  }
+
+  bool read_convert_input(ConvertInput& in) {
+    if (!read_program(in) || !place(in) || !read_part(in.part, in.part_name)) return false;
+    in.keep_links = options_.links == "keep";
+    return complete(in);
   }
 
   /// Of the places that the search finds the best that gives a certified program; `in` is then
