@@ -89,11 +89,17 @@ void Executor::cycle(const BlockWords& block, const BlockPlan& plan, GCode befor
     return refuse("NC260", "a cycle has no words of rotary or further axes; position them before");
   }
   const bool continues = is_cycle(before);
+  if (continues && is_linuxcnc() && modal_.cycle.incremental != modal_.incremental) {
+    return refuse("NC261",
+                  "the series goes on in another distance mode (G90, G91), where the height that "
+                  "it returns to is not stated; write G80 before");
+  }
   const AxisWords here = coordinates_.program_from_world(coordinates_.world());
   const double level = continues ? modal_.cycle.level : here[plane.third];
   // LinuxCNC keeps the words of one and the same cycle, the Fanuc family those of all.
   if (is_linuxcnc() ? before != code : !continues) modal_.cycle = {};
   modal_.cycle.level = level;
+  modal_.cycle.incremental = modal_.incremental;
   if (plan.axes == 0 && is_linuxcnc()) {
     return refuse("NC260", "the axis words are missing; write the place of the hole");
   }

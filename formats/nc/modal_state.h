@@ -20,7 +20,8 @@ struct CycleMemory {
   std::optional<double> peck;                               ///< Q
   std::optional<double> dwell;                              ///< P, s
   std::optional<double> shift_first, shift_second, middle;  ///< G87
-  double level = 0.0;  ///< height at the start of the series, program coordinates, mm
+  double level = 0.0;        ///< height at the start of the series, program coordinates, mm
+  bool incremental = false;  ///< G91 at the series' last block
 };
 
 /// The modal state of RS274NGC but for coordinates; the values are those at the start of a program.

@@ -156,6 +156,7 @@ TEST_CASE("cycles: what is refused", "[formats][nc][cycles]") {
     const char* code;
   };
   const Row rows[] = {{"G81 X1 R1", "NC260"},
+                      {"G91 G81 X1 Z-1 R1\nG90 X2", "NC261"},
                       {"G81 X1 Z-1", "NC260"},
                       {"G81", "NC260"},
                       {"G81 X1 Z-1 R-2", "NC260"},
