@@ -120,6 +120,7 @@ struct RecipeSettings {
   double kappa = 0.5;
   double lambda = 0.5;
   std::optional<double> ramp_c1;  ///< of ramp; nothing: by the turning angle
+  std::string dense = "curve";    ///< what becomes of dense points: curve | corners
   std::string task = "axis";      ///< axis (rotation about the tool is free) | pose
   std::string orientation = "programmed";
   std::string optimise = "none";

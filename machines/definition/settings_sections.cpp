@@ -244,6 +244,7 @@ RecipeSettings read_recipe(TableReader reader) {
   choose("kind", {"robot", "laser", "finishing", "five_axis"}, recipe.kind);
   choose("smoothing", {"acr", "ramp", "none"}, recipe.smoothing);
   choose("shape", {"half", "paper", "tuned"}, recipe.shape);
+  choose("dense", {"curve", "corners"}, recipe.dense);
   choose("orientation", {"programmed", "qi", "qi_c2", "via", "cone", "graph", "monotone"},
          recipe.orientation);
   choose("optimise", {"jerk", "none"}, recipe.optimise);

@@ -40,6 +40,7 @@ SmoothingSettings smoothing_settings(const MachineDefinition& machine) {
   s.corner_tip = tolerance.tip * tolerance.budget.smoothing;
   s.corner_axis = tolerance.axis * tolerance.budget.smoothing;
   s.whole_rotation = r.task == "pose";
+  s.fit_dense = r.dense == "curve";
   return s;
 }
 

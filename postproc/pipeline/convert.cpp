@@ -271,6 +271,7 @@ class Converter {
     tell_clearing();
     out_.corners = smoothed_->corners();
     out_.merged_points = smoothed_->merged_points();
+    out_.fitted_points = smoothed_->fitted_points();
     watch_.lap("corners");
     append(out_.diagnostics, posture_notes(planned.value(), in_.input_name));
     if (!schedule(planned.value())) return false;

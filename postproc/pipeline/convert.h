@@ -83,6 +83,7 @@ struct Conversion {
   ToolPath path;      ///< the input's, split where cuts were, as the line map counts its segments;
                       ///< empty unless ConvertInput::timed
   std::uint32_t merged_points = 0;
+  std::uint32_t fitted_points = 0;  ///< that curves took the place of
   std::size_t links = 0;
   std::size_t blocks = 0;
   std::vector<StageTime> stages;

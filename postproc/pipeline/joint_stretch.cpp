@@ -167,8 +167,8 @@ class StretchBuilder {
   // What holds on a piece that lies on the way to `sample`; of = s per second of the whole leg.
   void add_piece_data(std::size_t sample, double rate) {
     const PathPoint& point = path_.points[samples_[sample].segment];
-    const double way = in_.path.reference().length(samples_[sample].segment);
-    now_.feed.push_back(point.duration > 0.0 && way > kNoWay ? way / point.duration : kInfinity);
+    const double feed = in_.path.feed(samples_[sample].leg);
+    now_.feed.push_back(feed > 0.0 ? feed : kInfinity);
     now_.rate.push_back(rate > 0.0 ? rate : kInfinity);
     now_.line.push_back(point.line);
     now_.beam.push_back(point.beam);

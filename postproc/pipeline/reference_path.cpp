@@ -172,6 +172,11 @@ double ReferencePath::length(std::size_t segment) const {
   return length;
 }
 
+double ReferencePath::feed(std::size_t segment) const {
+  const double duration = path_.points[segment].duration;
+  return duration > 0.0 ? length(segment) / duration : 0.0;
+}
+
 PathPlace place_between(const ReferencePath& reference, const PathPlace& from, const PathPlace& to,
                         double t) {
   const bool next = from.s == 1.0 && from.segment + 1 == to.segment;

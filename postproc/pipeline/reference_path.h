@@ -41,6 +41,9 @@ class ReferencePath {
   /// Path length of the tip over a segment, mm; 0 when only the axis turns.
   double length(std::size_t segment) const;
 
+  /// Programmed feed of the tip on a segment, mm/s; 0: none, or the tip does not move.
+  double feed(std::size_t segment) const;
+
   /// A direction of the words' frame, in W.
   Vec3 part_direction(const Vec3& direction) const { return part_from_world_.linear() * direction; }
 

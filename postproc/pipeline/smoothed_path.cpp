@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/smooth/merge_points.h"
+#include "postproc/pipeline/dense_runs.h"
 
 namespace smoothpost {
 
@@ -13,24 +14,10 @@ constexpr double kNoMotion = 1e-9;     // mm
 constexpr double kNoTurn = 1e-10;      // rad
 constexpr double kLongestArc = 2.0;    // rad of sweep in one leg
 constexpr double kSameFeed = 1e-6;     // of the feed
+constexpr double kNearFeed = 0.05;     // of the feed: on one span of a curve the least one counts
 constexpr int kMostPieces = 256;       // of a curve
 constexpr double kFitShare = 0.5;      // of the merge share, for legs in place of curves
 constexpr int kCertificateSteps = 24;  // on each side of a corner
-
-Eigen::Quaterniond least_rotation(const Vec3& from, const Vec3& to) {
-  const double angle = angle_between(from, to);
-  Vec3 normal = from.cross(to);
-  // The plane that great_circle() takes.
-  if (normal.norm() < 1e-12) normal = from.unitOrthogonal();
-  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, normal.normalized()));
-}
-
-Vec3 rotation_vector(const Eigen::Quaterniond& from, const Eigen::Quaterniond& to) {
-  const Eigen::AngleAxisd turn(from.conjugate() * to);
-  double angle = turn.angle();
-  if (angle > EIGEN_PI) angle -= 2.0 * EIGEN_PI;
-  return angle * turn.axis();
-}
 
 // The matrix of a unit quaternion is quadratic in it: the same form with two factors.
 Mat3 rotation_form(const Eigen::Vector4d& p, const Eigen::Vector4d& q) {
@@ -51,8 +38,9 @@ MatrixJet rotation_jet(const std::array<Eigen::Vector4d, 4>& q) {
 }  // namespace
 
 SmoothedPath::SmoothedPath(const ReferencePath& reference) : reference_(reference) {
-  legs_.push_back({{0, 1.0}, {0, 1.0}});
-  for (std::uint32_t k = 1; k <= reference.segments(); ++k) legs_.push_back({{k, 0.0}, {k, 1.0}});
+  legs_.push_back({{0, 1.0}, {0, 1.0}, -1, 0, -1});
+  for (std::uint32_t k = 1; k <= reference.segments(); ++k)
+    legs_.push_back({{k, 0.0}, {k, 1.0}, -1, 0, -1});
 }
 
 CornerSettings corner_settings(const SmoothingSettings& from) {
@@ -80,12 +68,12 @@ class PathSmoother {
 
   void run() {
     mark_exact();
-    out_.legs_.push_back({{0, 1.0}, {0, 1.0}});
+    out_.legs_.push_back({{0, 1.0}, {0, 1.0}, -1, 0, -1});
     auto cut = cuts_.begin();
     for (std::uint32_t k = 1; k <= reference_.segments();) {
       while (cut != cuts_.end() && (cut->omitted || cut->last < k)) ++cut;
       if (cut == cuts_.end() || k < cut->first) {
-        out_.legs_.push_back({{k, 0.0}, {k, 1.0}});
+        out_.legs_.push_back({{k, 0.0}, {k, 1.0}, -1, 0, -1});
         ++k;
         continue;
       }
@@ -95,16 +83,7 @@ class PathSmoother {
   }
 
  private:
-  /// A point of the path before merging, and what the leg that ends here is.
-  struct Node {
-    PathPlace place;
-    CutterLocation location;
-    Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
-    double length = 0.0;  ///< way of the tip from the cut's start, mm
-    bool exact = false;
-    bool keep = false;
-    std::int32_t arc = -1;
-  };
+  using Node = SmoothingNode;
 
   void mark_exact() {
     exact_.assign(path_.points.size(), false);
@@ -128,20 +107,77 @@ class PathSmoother {
     nodes_.push_back(start);
     for (std::uint32_t k = first; k <= last; ++k) add_segment(k);
     nodes_.back().exact = nodes_.back().keep = true;
-    for (std::size_t i = 1; i + 1 < nodes_.size(); ++i)
-      if (nodes_[i].place.s == 1.0 && changes_feed(nodes_[i].place.segment)) nodes_[i].keep = true;
+    drop_repeated();
+    for (std::size_t i = 1; i + 1 < nodes_.size(); ++i) {
+      Node& node = nodes_[i];
+      node.split = node.exact;
+      if (node.place.s < 1.0) continue;
+      const double change = feed_change(node.place.segment, nodes_[i + 1].place.segment);
+      if (change > kSameFeed) node.keep = true;
+      if (change > kNearFeed) node.split = true;
+    }
+    std::vector<DenseRun> curves;
+    if (settings_.fit_dense) curves = dense_runs(reference_, nodes_, settings_);
+    std::size_t next = 0;
+    const Node* behind = nullptr;
+    for (DenseRun& run : curves) {
+      if (!run.joined) blend(behind, next, run.before, &run.begin);
+      add_curve(run);
+      next = run.after;
+      behind = &run.end;
+    }
+    blend(behind, next, nodes_.size(), nullptr);
+  }
+
+  // Nodes that repeat their neighbour; of a kept one's repetitions the kept one stays.
+  void drop_repeated() {
+    std::vector<Node> kept;
+    kept.reserve(nodes_.size());
+    for (Node& node : nodes_) {
+      if (!kept.empty() && stands_still(kept.back(), node) && !(kept.back().keep && node.keep)) {
+        ++out_.merged_points_;
+        if (!node.keep) continue;
+        kept.pop_back();
+      }
+      kept.push_back(std::move(node));
+    }
+    nodes_ = std::move(kept);
+  }
+
+  // Corners from the end of a curve (or the cut's start) to the start of one (or the cut's end).
+  // Legs that go straight into a curve stay as they are: the curve has their direction.
+  void blend(const Node* behind, std::size_t first, std::size_t last, const Node* before) {
+    part_.clear();
+    if (behind) part_.push_back(*behind);
+    part_.insert(part_.end(), nodes_.begin() + static_cast<std::ptrdiff_t>(first),
+                 nodes_.begin() + static_cast<std::ptrdiff_t>(last));
+    if (before) part_.push_back(*before);
+    if (part_.size() < 2) return;
+    if (behind) part_[1].keep = true;
+    if (before) part_[part_.size() - 2].keep = true;
+    part_.front().keep = part_.back().keep = true;
     merge();
     make_runs();
   }
 
-  bool changes_feed(std::uint32_t k) const {
-    const auto feed = [this](std::uint32_t segment) {
-      const double duration = path_.points[segment].duration;
-      return duration > 0.0 ? reference_.length(segment) / duration : 0.0;
-    };
-    const double a = feed(k);
-    const double b = feed(k + 1);
-    return std::abs(a - b) > kSameFeed * std::max(a, b);
+  void add_curve(DenseRun& run) {
+    PathPlace from = run.begin.place;
+    for (std::uint32_t span = 0; span < run.fit.ends.size(); ++span) {
+      const bool last = span + 1 == run.fit.ends.size();
+      const PathPlace to = last ? run.end.place : nodes_[run.inside + run.fit.ends[span] - 1].place;
+      out_.legs_.push_back({from, to, -1, span, static_cast<std::int32_t>(out_.curves_.size())});
+      from = to;
+    }
+    // A middle of a leg is no point of the input; a joint was counted before.
+    out_.fitted_points_ += static_cast<std::uint32_t>(run.after - run.inside) +
+                           (run.inside > run.before && !run.joined ? 1 : 0);
+    out_.curves_.push_back(std::move(run.fit.curve));
+  }
+
+  double feed_change(std::uint32_t before, std::uint32_t after) const {
+    const double a = reference_.feed(before);
+    const double b = reference_.feed(after);
+    return a == b ? 0.0 : std::abs(a - b) / std::max(a, b);
   }
 
   Node node_at(const PathPlace& place) const {
@@ -267,8 +303,8 @@ class PathSmoother {
 
   void merge() {
     std::vector<MergePoint> points;
-    points.reserve(nodes_.size());
-    for (const Node& node : nodes_)
+    points.reserve(part_.size());
+    for (const Node& node : part_)
       points.push_back(
           {node.location.tip, node.location.axis, node.rotation, node.length, node.keep});
     MergeSettings settings;
@@ -276,29 +312,28 @@ class PathSmoother {
     settings.axis_tolerance = (1.0 - kFitShare) * settings_.merge_axis;
     settings.whole_rotation = path_.full_pose;
     std::vector<Node> kept;
-    for (const std::uint32_t i : merge_points(points, settings)) kept.push_back(nodes_[i]);
-    out_.merged_points_ += static_cast<std::uint32_t>(nodes_.size() - kept.size());
-    nodes_ = std::move(kept);
+    for (const std::uint32_t i : merge_points(points, settings)) kept.push_back(part_[i]);
+    out_.merged_points_ += static_cast<std::uint32_t>(part_.size() - kept.size());
+    part_ = std::move(kept);
   }
 
-  bool stands_still(std::size_t node) const {
-    const Node& a = nodes_[node - 1];
-    const Node& b = nodes_[node];
+  static bool stands_still(const Node& a, const Node& b) {
     return b.arc < 0 && (a.location.tip - b.location.tip).norm() < kNoMotion &&
            (a.location.axis - b.location.axis).norm() < kNoTurn &&
            a.rotation.angularDistance(b.rotation) < kNoTurn;
   }
+  bool stands_still(std::size_t node) const { return stands_still(part_[node - 1], part_[node]); }
 
   // One CornerPath for each stretch without a leg on which nothing moves.
   void make_runs() {
-    for (std::size_t i = 1; i < nodes_.size();) {
+    for (std::size_t i = 1; i < part_.size();) {
       if (stands_still(i)) {
-        out_.legs_.push_back({nodes_[i - 1].place, nodes_[i].place});
+        out_.legs_.push_back({part_[i - 1].place, part_[i].place, -1, 0, -1});
         ++i;
         continue;
       }
       std::size_t end = i;
-      while (end < nodes_.size() && !stands_still(end)) ++end;
+      while (end < part_.size() && !stands_still(end)) ++end;
       make_run(i - 1, end - 1);
       i = end;
     }
@@ -308,27 +343,27 @@ class PathSmoother {
     std::vector<PathNode> nodes;
     std::vector<PathLeg> legs;
     PathNode node;
-    node.tip = nodes_[first].location.tip;
-    node.rotation = path_.full_pose ? nodes_[first].rotation
-                                    : least_rotation(Vec3::UnitZ(), nodes_[first].location.axis);
+    node.tip = part_[first].location.tip;
+    node.rotation = path_.full_pose ? part_[first].rotation
+                                    : least_rotation(Vec3::UnitZ(), part_[first].location.axis);
     nodes.push_back(node);
     out_.first_leg_.push_back(static_cast<std::uint32_t>(out_.legs_.size()));
     for (std::size_t i = first + 1; i <= last; ++i) {
       PathLeg leg;
-      leg.arc = nodes_[i].arc;
+      leg.arc = part_[i].arc;
       const Eigen::Quaterniond before = node.rotation;
-      node.tip = nodes_[i].location.tip;
-      node.exact = nodes_[i].exact;
+      node.tip = part_[i].location.tip;
+      node.exact = part_[i].exact;
       node.rotation =
           path_.full_pose
-              ? nodes_[i].rotation
-              : least_rotation(nodes_[i - 1].location.axis, nodes_[i].location.axis) * before;
+              ? part_[i].rotation
+              : least_rotation(part_[i - 1].location.axis, part_[i].location.axis) * before;
       leg.turn = rotation_vector(before, node.rotation);
       nodes.push_back(node);
       legs.push_back(leg);
-      out_.legs_.push_back({nodes_[i - 1].place, nodes_[i].place,
+      out_.legs_.push_back({part_[i - 1].place, part_[i].place,
                             static_cast<std::int32_t>(out_.runs_.size()),
-                            static_cast<std::uint32_t>(legs.size() - 1)});
+                            static_cast<std::uint32_t>(legs.size() - 1), -1});
     }
     out_.runs_.emplace_back(std::move(nodes), std::move(legs), arcs_, corner_settings(settings_));
   }
@@ -339,7 +374,8 @@ class PathSmoother {
   const std::vector<Cut>& cuts_;
   const SmoothingSettings& settings_;
   std::vector<bool> exact_;
-  std::vector<Node> nodes_;
+  std::vector<Node> nodes_;  ///< of the cut
+  std::vector<Node> part_;   ///< of it, between curves
   std::vector<ArcGeometry> arcs_;
 };
 
@@ -355,6 +391,11 @@ const PathPoint& SmoothedPath::point(std::size_t leg) const {
 
 CutterLocation SmoothedPath::at(std::size_t leg, double s) const {
   const Leg& l = legs_[leg];
+  if (l.curve >= 0) {
+    const PoseCurve& curve = curves_[static_cast<std::size_t>(l.curve)];
+    const Pose pose = curve.at(l.index, s * curve.length(l.index));
+    return {pose.translation(), pose.linear().col(2)};
+  }
   if (l.run >= 0) {
     const CornerPath& run = runs_[static_cast<std::size_t>(l.run)];
     const Pose pose = run.at(l.index, s * run.length(l.index));
@@ -367,6 +408,10 @@ CutterLocation SmoothedPath::at(std::size_t leg, double s) const {
 
 Mat3 SmoothedPath::rotation_at(std::size_t leg, double s) const {
   const Leg& l = legs_[leg];
+  if (l.curve >= 0) {
+    const PoseCurve& curve = curves_[static_cast<std::size_t>(l.curve)];
+    return curve.at(l.index, s * curve.length(l.index)).linear();
+  }
   if (l.run >= 0) {
     const CornerPath& run = runs_[static_cast<std::size_t>(l.run)];
     return run.at(l.index, s * run.length(l.index)).linear();
@@ -378,10 +423,11 @@ Mat3 SmoothedPath::rotation_at(std::size_t leg, double s) const {
 
 std::optional<PoseJet> SmoothedPath::jet(std::size_t leg, double s) const {
   const Leg& l = legs_[leg];
-  if (l.run < 0) return {};
-  const CornerPath& run = runs_[static_cast<std::size_t>(l.run)];
-  const double length = run.length(l.index);
-  PoseDerivatives d = run.derivatives(l.index, s * length);
+  if (l.run < 0 && l.curve < 0) return {};
+  const double length = this->length(leg);
+  PoseDerivatives d =
+      l.curve >= 0 ? curves_[static_cast<std::size_t>(l.curve)].derivatives(l.index, s * length)
+                   : runs_[static_cast<std::size_t>(l.run)].derivatives(l.index, s * length);
   double scale = 1.0;
   PoseJet jet;
   for (std::size_t r = 0; r < 4; ++r, scale *= length) {
@@ -400,8 +446,19 @@ PathPlace SmoothedPath::place(std::size_t leg, double s) const {
 
 double SmoothedPath::length(std::size_t leg) const {
   const Leg& l = legs_[leg];
+  if (l.curve >= 0) return curves_[static_cast<std::size_t>(l.curve)].length(l.index);
   if (l.run >= 0) return runs_[static_cast<std::size_t>(l.run)].length(l.index);
   return leg == 0 ? 0.0 : reference_.length(l.to.segment);
+}
+
+double SmoothedPath::feed(std::size_t leg) const {
+  const Leg& l = legs_[leg];
+  double least = reference_.feed(l.to.segment);
+  if (l.curve >= 0)
+    for (std::uint32_t k = l.from.segment + (l.from.s < 1.0 ? 0 : 1); k < l.to.segment; ++k)
+      if (const double feed = reference_.feed(k); feed > 0.0)
+        least = least > 0.0 ? std::min(least, feed) : feed;
+  return least;
 }
 
 std::vector<double> SmoothedPath::breaks(std::size_t leg) const {
@@ -417,10 +474,12 @@ std::vector<double> SmoothedPath::breaks(std::size_t leg) const {
 SecondDerivativeBound SmoothedPath::second_derivative_bound(std::size_t leg, double from,
                                                             double to) const {
   const Leg& l = legs_[leg];
-  if (l.run < 0) return reference_.second_derivative_bound(l.to.segment);
-  const CornerPath& run = runs_[static_cast<std::size_t>(l.run)];
-  const double length = run.length(l.index);
-  const auto bend = run.bend_bound(l.index, from * length, to * length);
+  if (l.run < 0 && l.curve < 0) return reference_.second_derivative_bound(l.to.segment);
+  const double length = this->length(leg);
+  const CornerPath::Bend bend =
+      l.curve >= 0
+          ? curves_[static_cast<std::size_t>(l.curve)].bend_bound(l.index)
+          : runs_[static_cast<std::size_t>(l.run)].bend_bound(l.index, from * length, to * length);
   SecondDerivativeBound bound;
   bound.tip = bend.tip * length * length;
   bound.axis = bend.axis * length * length;

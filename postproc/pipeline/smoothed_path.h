@@ -7,6 +7,7 @@
 
 #include "kernels/kinematics/joint_jet.h"
 #include "kernels/smooth/corner_path.h"
+#include "kernels/smooth/pose_curve.h"
 #include "postproc/pipeline/cuts.h"
 #include "postproc/pipeline/reference_path.h"
 
@@ -23,6 +24,7 @@ struct SmoothingSettings {
   double corner_tip = 0.0;      ///< mm, for corners
   double corner_axis = 0.0;     ///< rad
   bool whole_rotation = false;  ///< corner_axis is for the whole rotation (task = "pose")
+  bool fit_dense = false;       ///< dense points become curves (dense_runs.h), not corners
 };
 
 /// The same for one CornerPath.
@@ -44,13 +46,15 @@ struct SmoothedCorner {
   bool stop = false;
 };
 
-/// The input's path with its cuts smoothed: dense points merged, corners blended (CornerPath), arcs
-/// kept as arcs. Without settings it is the input's path itself.
+/// The input's path with its cuts smoothed: points so dense that they stand for a curve become that
+/// curve (dense_runs.h), others are merged where they lie in line, corners blended (CornerPath),
+/// arcs kept as arcs. Without settings it is the input's path itself.
 ///
 /// It consists of legs, counted from 1; leg 0 stands for the first point. A leg is one segment of
 /// the input, a part of one (of a long arc, of a curve that is neither line nor arc), or several
-/// whose points were merged. The share s ∈ [0, 1] of a leg is the parameter σ of CornerPath: at
-/// equal s a smoothed pose stands for the input's pose at place(leg, s).
+/// whose points were merged or lie near one span of a curve. The share s ∈ [0, 1] of a leg is the
+/// parameter σ of CornerPath or PoseCurve: at equal s a smoothed pose stands for the input's pose
+/// at place(leg, s).
 ///
 /// Never blended and never merged: points with a process event or a dwell, where the tool or its
 /// length changes, the ends of cuts; never merged: where the feed changes. Segments outside of cuts
@@ -80,6 +84,9 @@ class SmoothedPath {
   PathPlace place(std::size_t leg, double s) const;
   /// Extent of a leg in the parameter σ, mm; 0 for leg 0.
   double length(std::size_t leg) const;
+  /// Programmed feed, mm/s, 0: none; on a span of a curve the least of the segments that it stands
+  /// for, which differ by 5 % at most from one to the next.
+  double feed(std::size_t leg) const;
   /// Ascending shares with 0 and 1: between two of them the leg has one formula.
   std::vector<double> breaks(std::size_t leg) const;
   /// Bounds of |d²/ds²| of tip and axis between two neighbouring breaks.
@@ -87,6 +94,8 @@ class SmoothedPath {
 
   const std::vector<CornerPath>& runs() const { return runs_; }
   std::uint32_t merged_points() const { return merged_points_; }
+  /// Points of the input that curves took the place of.
+  std::uint32_t fitted_points() const { return fitted_points_; }
   /// Points of the input that were blended or that stop the tool, in path order. Measured on a
   /// dense grid of their windows, against ReferencePath.   Cost: about 10 µs a corner.
   std::vector<SmoothedCorner> corners() const;
@@ -95,8 +104,9 @@ class SmoothedPath {
   friend class PathSmoother;
   struct Leg {
     PathPlace from, to;
-    std::int32_t run = -1;  ///< index of the CornerPath, −1: the input's own
-    std::uint32_t index = 0;
+    std::int32_t run = -1;    ///< index of the CornerPath, −1: none
+    std::uint32_t index = 0;  ///< leg of the run, span of the curve
+    std::int32_t curve = -1;  ///< index of the PoseCurve; −1 and no run: the input's own
   };
   SmoothedCorner measure(const CornerPath& run, std::size_t first_leg, std::size_t node) const;
 
@@ -104,7 +114,9 @@ class SmoothedPath {
   std::vector<Leg> legs_;  ///< [0] is the first point
   std::vector<CornerPath> runs_;
   std::vector<std::uint32_t> first_leg_;  ///< of each run
+  std::vector<PoseCurve> curves_;
   std::uint32_t merged_points_ = 0;
+  std::uint32_t fitted_points_ = 0;
 };
 
 }  // namespace smoothpost

@@ -301,6 +301,7 @@ std::string report_json(const Conversion& c, const ReportContext& context) {
                 {"links", c.links},
                 {"cutter_locations", context.cutter_locations},
                 {"merged_points", c.merged_points},
+                {"fitted_points", c.fitted_points},
                 {"length_mm", number(c.length)}};
   j["output"] = {{"lines", std::count(c.program.begin(), c.program.end(), '\n')},
                  {"blocks", c.blocks},
