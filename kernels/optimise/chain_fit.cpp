@@ -250,7 +250,7 @@ ChainFit fit_chain(const ScrewChain& chain, const std::vector<TipReading>& readi
   const Matrix jacobian = problem.jacobian(theta);
   // The gradient against the residual: their angle is a right one at a minimum.
   const double slope = ((jacobian * basis).transpose() * left).norm();
-  fit.status = slope <= kSmallGradient * std::max(left.norm(), 1e-3)
+  fit.status = slope <= kSmallGradient * std::max(left.norm(), 1.0)
                    ? ChainFit::Status::ok
                    : ChainFit::Status::not_converged;
   const Matrix covariance = (jacobian.transpose() * jacobian).ldlt().solve(Matrix::Identity(n, n));

@@ -252,7 +252,10 @@ TEST_CASE("import_urdf: chains that are not told or coupled are refused", "[mach
 TEST_CASE("import_urdf: every description of the corpus is imported or refused by name",
           "[machines][import]") {
   const auto files = test::corpus_files("6_robot_model", {".urdf", ".xacro"});
-  if (files.empty()) return WARN("no corpus: skipped");
+  if (files.empty()) {
+    WARN("no corpus: skipped");
+    return;
+  }
   std::map<std::string, int> table;
   for (const auto& file : files) {
     INFO(file);
@@ -393,7 +396,10 @@ TEST_CASE("import_linuxcnc: LinuxCNC's own configurations are imported or refuse
           "[machines][import]") {
   namespace fs = std::filesystem;
   const fs::path root = "/usr/share/doc/linuxcnc/examples/sample-configs/sim";
-  if (!fs::exists(root)) return WARN("LinuxCNC is not installed: skipped");
+  if (!fs::exists(root)) {
+    WARN("LinuxCNC is not installed: skipped");
+    return;
+  }
   std::map<std::string, int> table;
   int count = 0;
   for (const auto& entry : fs::recursive_directory_iterator(root)) {
