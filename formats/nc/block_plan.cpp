@@ -480,12 +480,17 @@ void BlockPlanner::refuse_unmapped(const BlockWords& block, const EventMatch& ma
     if ((letters_told_ & bit) != 0) return;
     letters_told_ |= bit;
   }
-  refuse("PR101",
-         word +
-             " has no row in the process table of the input machine (first of such words); add "
-             "a row to its [process.events], give a table by --process FILE, or set "
-             "process.unmapped = \"comment\" to keep such words as comments that do nothing",
-         reader_.place(block, piece));
+  refuse(
+      "PR101",
+      word +
+          (settings_.any_axis_needs_machine
+               ? " is known to no process table, as no input machine is named (first of such "
+                 "words); say --input-machine MACHINE, the machine that the program was posted "
+                 "for, or give a table by --process FILE"
+               : " has no row in the process table of the input machine (first of such words); "
+                 "add a row to its [process.events], give a table by --process FILE, or set "
+                 "process.unmapped = \"comment\" to keep such words as comments that do nothing"),
+      reader_.place(block, piece));
 }
 
 }  // namespace smoothpost::nc

@@ -81,6 +81,9 @@ Result<InterpretationSummary> Executor::run() {
                  {static_cast<std::uint32_t>(program.blocks.size()), 0});
   }
   if (log_.has_error()) return Result<InterpretationSummary>::failure(log_.take());
+  for (const auto& unit : units_)
+    if (unit->owned)
+      summary_.files.push_back({unit->owned->file_name, std::move(unit->owned->text)});
   return {std::move(summary_), log_.take()};
 }
 

@@ -48,12 +48,19 @@ struct InterpreterSettings {
   bool plain_blocks = false;
 };
 
+/// The text of a subroutine's file that the run has read.
+struct CalledFile {
+  std::string name;  ///< without its folder
+  std::string text;
+};
+
 struct InterpretationSummary {
   bool uses_tcp = false;
   bool uses_rotary = false;
   bool ended = false;             ///< M2, M30 or a second %
   std::vector<int> tools;         ///< tool numbers that were changed to, in order
   std::vector<int> work_systems;  ///< systems used by motions, in order of first use
+  std::vector<CalledFile> files;  ///< of subroutines, in the order of their first calls
 };
 
 /// Runs the program, with its loops and subroutines, through the modal state of its dialect

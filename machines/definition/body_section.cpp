@@ -5,6 +5,7 @@
 #include <optional>
 #include <set>
 
+#include "kernels/core/nearest_name.h"
 #include "kernels/core/units.h"
 #include "machines/definition/body_pairs.h"
 #include "machines/definition/sections.h"
@@ -166,7 +167,8 @@ class PairReader {
     for (const auto& item : value.items) {
       if (known_.count(item.string)) continue;
       good = false;
-      const std::string guess = problems_.full() ? std::string() : nearest(item.string, names_);
+      const std::string guess =
+          problems_.full() ? std::string() : nearest_name(item.string, names_);
       problems_.error("MF114",
                       "the machine has no body " + item.string.substr(0, 64) +
                           (guess.empty() ? std::string() : ": did you mean " + guess + "?"),

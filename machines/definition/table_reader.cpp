@@ -7,31 +7,19 @@
 #include <tuple>
 #include <utility>
 
+#include "kernels/core/nearest_name.h"
+
 namespace smoothpost::machine_file {
 
 namespace {
+
+constexpr double kLargestNumber = 1e9;  // of any unit
 
 /// Longest first, so that "_mm_per_s" is not taken for "_s".
 constexpr std::array<std::string_view, 16> kUnits = {
     "_inch_per_s3", "_inch_per_s2", "_mm_per_min", "_inch_per_s", "_deg_per_s3", "_deg_per_s2",
     "_mm_per_s3",   "_mm_per_s2",   "_deg_per_s",  "_mm_per_s",   "_inch",       "_deg",
     "_rad",         "_mm",          "_ms",         "_s"};
-
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t above = row[j];
-      const std::size_t change = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      row[j] = std::min({change, above + 1, row[j - 1] + 1});
-      diagonal = above;
-    }
-  }
-  return row[b.size()];
-}
 
 bool before(const Diagnostic& a, const Diagnostic& b) {
   const auto place = [](const Diagnostic& d) {
@@ -55,19 +43,6 @@ std::string one_of(const std::vector<std::string>& names) {
     text += names[i];
   }
   return text;
-}
-
-std::string nearest(std::string_view name, const std::vector<std::string>& names) {
-  const std::string_view start = name.substr(0, 64);  // no key is longer; bounds the work
-  std::string best;
-  std::size_t least = std::max<std::size_t>(2, start.size() / 3) + 1;
-  for (const auto& candidate : names) {
-    const std::size_t distance = edit_distance(start, candidate);
-    if (distance >= least) continue;
-    least = distance;
-    best = candidate;
-  }
-  return best;
 }
 
 std::string_view without_unit(std::string_view key) {
@@ -171,6 +146,11 @@ std::optional<double> TableReader::number(std::string_view key, Bound bound) {
   if (found == nullptr) return std::nullopt;
   const auto value = finite(found->value, std::string(key));
   if (!value) return std::nullopt;
+  if (std::abs(*value) > kLargestNumber) {
+    error("MF108",
+          std::string(key) + " is " + to_text(*value) + " and has to be 1000000000 at most", key);
+    return std::nullopt;
+  }
   const bool too_small =
       (bound == Bound::positive && *value <= 0.0) || (bound == Bound::not_negative && *value < 0.0);
   if (!too_small) return value;
@@ -370,7 +350,7 @@ void TableReader::report_unknown(const TomlEntry& entry) {
                      entry.where);
     return;
   }
-  const std::string guess = problems_->full() ? std::string() : nearest(entry.key, known_);
+  const std::string guess = problems_->full() ? std::string() : nearest_name(entry.key, known_);
   problems_->error(
       "MF104",
       title_ + " knows no key " + shown +

@@ -110,9 +110,6 @@ std::string to_text(double value);
 /// `a, b or c`.
 std::string one_of(const std::vector<std::string>& names);
 
-/// The one of `names` that is fewest edits away from `name`, or empty when none is near.
-std::string nearest(std::string_view name, const std::vector<std::string>& names);
-
 /// A key without its unit: "max_velocity_mm_per_s" is "max_velocity".
 std::string_view without_unit(std::string_view key);
 

@@ -130,8 +130,10 @@ class Reading : public robot::RobotReading {
         result.last_line = at.line;
       } else if (section != Section::positions || !read_position(at, text, open)) {
         return error(at, "NC346",
-                     "this line has no place here: /PROG, /ATTR, /MN, /POS and /END "
-                     "have to follow each other");
+                     "this line has no place here, or is not as this version reads it: " +
+                         std::string(text.substr(0, 64)) +
+                         ". /PROG, /ATTR, /MN, /POS and /END have to follow each other, positions "
+                         "are in group 1, user frame 9 and tool frame 9");
       }
     }
     result.line_count = static_cast<std::uint32_t>(lines.size());
@@ -144,7 +146,9 @@ class Reading : public robot::RobotReading {
     const auto number = whole_number(trimmed(text.substr(0, std::min(colon, text.size()))));
     if (colon == std::string_view::npos || text.back() != ';' || !number ||
         *number != static_cast<double>(instructions_.size()) + 1.0)
-      return error(at, "NC346", "a line is its number, rising by one, then : and ; at its end"),
+      return error(at, "NC346",
+                   "a line is its number, rising by one, then : and ; at its end, and this is " +
+                       std::string(text.substr(0, 64))),
              false;
     instructions_.push_back(
         {at, std::string(trimmed(text.substr(colon + 1, text.size() - colon - 2)))});
@@ -277,6 +281,17 @@ class Reading : public robot::RobotReading {
       rest.remove_prefix(end);
     }
     const bool joints = words[0] == "J";
+    for (std::size_t i = 3; i < words.size(); ++i) {
+      const std::string_view word = words[i];
+      if (word.substr(0, 3) == "CNT")
+        return error(instruction.at, "NC346",
+                     std::string(word) +
+                         ": how far CNT leaves a corner has no bound; write CR or "
+                         "FINE");
+      if (i > 3 && word != "TB" && words[i - 1] != "TB")
+        return error(instruction.at, "NC346",
+                     "the motion option " + std::string(word.substr(0, 32)) + " is not read");
+    }
     if (words.size() != 4 && (joints || words.size() != 6 || words[4] != "TB"))
       return error(instruction.at, "NC346", "a motion is J or L, P[n], its speed and FINE or CR");
     if (!frame_chosen_ || !tool_chosen_ || !has_frames())

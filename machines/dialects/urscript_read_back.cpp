@@ -152,26 +152,32 @@ class Reading : public robot::RobotReading {
 
   void read(TextPlace at, std::string_view line) {
     for (const char c : line)
-      if (static_cast<unsigned char>(c) < 0x20U || static_cast<unsigned char>(c) > 0x7EU)
+      if ((static_cast<unsigned char>(c) < 0x20U && c != '\t') ||
+          static_cast<unsigned char>(c) > 0x7EU)
         return error(at, "NC346", "a character outside printable ASCII");
     const std::string_view text = trimmed(line);
-    if (at.line == 1) {
+    if (!begun_) {
+      if (text.empty() || text.front() == '#') return;
       const bool good = text.size() > 7 && text.substr(0, 4) == "def " &&
                         text.substr(text.size() - 3) == "():" &&
                         is_name(text.substr(4, text.size() - 7));
       if (!good) error(at, "NC346", "the program has to begin with def name():");
+      begun_ = true;
       return;
     }
     if (text.empty()) return;
+    if (text.front() == '#') return;
     if (result.last_line > 0) return error(at, "NC346", "text behind the end of the program");
-    if (line == "end") {
+    if (text == "end") {
       result.last_line = at.line;
       return;
     }
-    if (line.substr(0, 2) != "  " || line[2] == ' ')
-      return error(at, "NC346",
-                   "a statement has two blanks in front of it, and none has its own end");
-    if (text.front() != '#') read_statement({at.line, 3}, text);
+    const auto column = static_cast<std::uint32_t>(text.data() - line.data()) + 1;
+    for (const char* block : {"if ", "while ", "def ", "thread ", "for ", "global ", "local "})
+      if (text.rfind(block, 0) == 0)
+        return error({at.line, column}, "NC346",
+                     "program flow and variables are not read: " + std::string(text.substr(0, 64)));
+    read_statement({at.line, column}, text);
   }
 
   void read_statement(TextPlace at, std::string_view text) {
@@ -180,6 +186,7 @@ class Reading : public robot::RobotReading {
       const Argument a = argument_of(text.substr(kPart.size()));
       if (a.kind != Argument::Kind::pose)
         return error(at, "NC346", "sp_part needs p[..] of six numbers");
+      part_stated_ = true;
       return set_part(at, pose_of(a.numbers));
     }
     if (result.moves.empty() && text == "popup(\"NOT CERTIFIED: read the report\", blocking=True)")
@@ -225,12 +232,27 @@ class Reading : public robot::RobotReading {
     return true;
   }
 
+  // A target p[..] without a frame of the part is one in the base, which is then the part's frame.
+  Argument::Kind target_kind(TextPlace at, const Call& call) {
+    const bool in_base =
+        !call.arguments.empty() && call.arguments[0].kind == Argument::Kind::pose && !part_stated_;
+    if (!in_base) return Argument::Kind::target;
+    set_part(at, Pose::Identity());
+    return Argument::Kind::pose;
+  }
+
   // t= of a move; nothing: a= and v= stand there. False after an error.
   bool take_time(TextPlace at, const Call& call, Argument::Kind kind,
                  std::optional<double>& seconds) {
     const bool timed = call.is(kind, {"t"});
     if (!timed && !call.is(kind, {"a", "v"}))
-      return error(at, "NC346", call.name + " needs its target and t=, or a= and v="), false;
+      return error(at, "NC346",
+                   call.name + (call.name == "movej" && !call.arguments.empty() &&
+                                        call.arguments[0].kind == Argument::Kind::pose
+                                    ? " to a pose: which of the arm's solutions it takes is not "
+                                      "certain; write its six joints"
+                                    : " needs its target and t=, or a= and v=")),
+             false;
     for (std::size_t i = 1; i < call.arguments.size(); ++i)
       if (!(call.arguments[i].number > 0.0))
         return error(at, "NC346", call.arguments[i].name + "= has to be above 0"), false;
@@ -243,7 +265,8 @@ class Reading : public robot::RobotReading {
     if (!take_time(at, call, Argument::Kind::list, seconds)) return;
     const auto& numbers = call.arguments[0].numbers;
     if (numbers.size() != 6) return error(at, "NC346", "movej needs [..] of six joints");
-    if (!has_frames()) return error(at, "a motion stands before sp_part and set_tcp");
+    if (!result.tool_frame) return error(at, "a motion stands before set_tcp");
+    if (!result.part) set_part(at, Pose::Identity());  // the base, until targets say another
     for (std::size_t i = 0; i < 6; ++i) set_joint(axes().arm[i], numbers[i]);
     add_joint_move(at, seconds);
   }
@@ -252,11 +275,16 @@ class Reading : public robot::RobotReading {
     using Kind = Argument::Kind;
     LineSpeed speed;
     double blend = 0.0;
+    const Kind kind = target_kind(at, call);
+    if (kind == Kind::target && !part_stated_)
+      return error(at, "NC348", "a motion in the part's frame stands before sp_part = p[..]");
     if (call.name == "movel") {
-      if (!take_time(at, call, Kind::target, speed.seconds)) return;
+      if (!take_time(at, call, kind, speed.seconds)) return;
+      if (const Argument* v = call.named("v"); kind == Kind::pose && v != nullptr)
+        speed.tip = v->number * kMillimetresPerMetre;
       if (rounded()) return error(at, "a movel behind a rounded corner: only movep rounds");
     } else {
-      if (!call.is(Kind::target, {"a", "v", "r"}) || !(call.named("v")->number > 0.0) ||
+      if (!call.is(kind, {"a", "v", "r"}) || !(call.named("v")->number > 0.0) ||
           !(call.named("a")->number > 0.0) || call.named("r")->number < 0.0)
         return error(at, "NC346", "movep needs its target, a=, v= and r=");
       speed.tip = call.named("v")->number * kMillimetresPerMetre;
@@ -264,6 +292,9 @@ class Reading : public robot::RobotReading {
     }
     add_line_move(at, pose_of(call.arguments[0].numbers), speed, blend);
   }
+
+  bool begun_ = false;        ///< by def name():
+  bool part_stated_ = false;  ///< by sp_part
 };
 
 }  // namespace

@@ -60,6 +60,8 @@ Options options_of(const smoothpost_options& o) {
   out.input_feed = text(o.input_feed);
   out.cl_frames = text(o.cl_frames);
   out.cl_circles = text(o.cl_circles);
+  out.run_budget = text(o.run_budget);
+  out.call_depth = text(o.call_depth);
   out.input_machine = text(o.input_machine);
   out.process = text(o.process);
   out.work_offset = list(o.work_offset, o.work_offset_count);

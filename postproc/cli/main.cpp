@@ -85,6 +85,8 @@ struct CallOptions {
     c.input_feed = or_null(l.input_feed);
     c.cl_frames = or_null(l.cl_frames);
     c.cl_circles = or_null(l.cl_circles);
+    c.run_budget = or_null(l.run_budget);
+    c.call_depth = or_null(l.call_depth);
     c.input_machine = or_null(l.input_machine);
     c.process = or_null(l.process);
     c.work_offset = work_offset.data();

@@ -1,10 +1,24 @@
 #include "postproc/cli/options.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iostream>
+#include <memory>
+
+#include "kernels/core/nearest_name.h"
 
 namespace smoothpost::cli {
 
 namespace {
+
+/// Help that opens with what the command does and an example, the footer of its App.
+class ExampleFirst : public CLI::Formatter {
+ public:
+  std::string make_description(const CLI::App* app) const override {
+    return CLI::Formatter::make_description(app) + "\n" + app->get_footer() + "\n";
+  }
+  std::string make_footer(const CLI::App*) const override { return {}; }
+};
 
 constexpr const char* kExample =
     "Example: a program posted for an A/C table machine, for a B/C table machine:\n"
@@ -60,6 +74,9 @@ void add_input_options(CLI::App* app, CommandLine& l) {
       "cl: what MSYS and CSYS do: one (a second frame is refused) | reported | applied");
   app->add_option("--cl-circles", l.cl_circles,
                   "cl: CIRCLE of the NX form about its axis: tangents (found out) | cw | ccw");
+  app->add_option("--run-budget", l.run_budget,
+                  "nc: blocks that loops, calls and cycles may run again; default 1000000");
+  app->add_option("--call-depth", l.call_depth, "nc: calls within each other; default 9");
   app->add_option("--input-machine", l.input_machine,
                   "the machine that the input was posted for; needed for rotary words");
   app->add_option("--process", l.process,
@@ -74,6 +91,14 @@ void add_input_options(CLI::App* app, CommandLine& l) {
       ->allow_extra_args(false);
   app->add_option("--tip-tolerance", l.tip_tolerance, "mm");
   app->add_option("--axis-tolerance", l.axis_tolerance, "deg");
+}
+
+void add_freedom_options(CLI::App* app, CommandLine& l) {
+  app->add_option("--lead", l.lead,
+                  "lasers: freedom of the beam along the cut around the programmed axis, deg");
+  app->add_option("--tilt", l.tilt, "the same across the cut, deg; both default to 0: kept");
+  app->add_option("--orientation", l.orientation,
+                  "programmed | cone | graph | via | monotone (the last four: lasers)");
 }
 
 void add_search_options(CLI::App* app, CommandLine& l) {
@@ -93,12 +118,8 @@ void add_convert(CLI::App& app, CommandLine& l) {
   add_search_options(c, l);
   c->add_option("--dialect", l.dialect, "output dialect instead of the machine's");
   add_input_options(c, l);
-  c->add_option("--lead", l.lead,
-                "lasers: freedom of the beam along the cut around the programmed axis, deg");
-  c->add_option("--tilt", l.tilt, "the same across the cut, deg; both default to 0: kept");
+  add_freedom_options(c, l);
   c->add_option("--smoothing", l.smoothing, "acr | ramp | none");
-  c->add_option("--orientation", l.orientation,
-                "programmed | cone | graph | via | monotone (the last four: lasers)");
   c->add_option("--optimise", l.optimise, "jerk (lasers) | none");
   c->add_option("--schedule", l.schedule, "jerk (default) | constant | programmed");
   c->add_option("--links", l.links,
@@ -160,6 +181,9 @@ void add_finish(CLI::App& app, CommandLine& l) {
 
 void add_place(CLI::App& app, CommandLine& l) {
   auto* c = app.add_subcommand("place", "where to put the part: prints a --work-offset");
+  c->footer(
+      "Example: where on the robot's table a contour can be cut, and with how much margin:\n"
+      "  smoothpost place contour.csv -m robot_6r --box 0,0,0,400,400,200\n");
   c->add_option("input", l.input, "NC program, CL data or CSV; - for standard input")->required();
   add_machine_options(c, l);
   add_part_options(c, l);
@@ -174,12 +198,17 @@ void add_place(CLI::App& app, CommandLine& l) {
 
 void add_check(CLI::App& app, CommandLine& l) {
   auto* c = app.add_subcommand("check", "certify an existing machine program");
+  c->footer(
+      "Example: limits and clearance of a program, and with --against its shape too:\n"
+      "  smoothpost check out.ngc -m table_table_bc --tool 1=60 --against part.ngc "
+      "--input-machine table_table_ac --json check.json\n");
   c->add_option("program", l.input, "the program; - for standard input")->required();
   add_machine_options(c, l);
   c->add_option("--dialect", l.dialect, "the program's dialect instead of the machine's");
   add_part_options(c, l);
   c->add_option("--against", l.against,
                 "the CAM program that it is to follow: certifies its shape too");
+  add_freedom_options(c, l);
   add_input_options(c, l);
   add_output_options(c, l);
 }
@@ -196,6 +225,52 @@ CLI::App* add_words(CLI::App& app, CommandLine& l, const char* name, const char*
   return c;
 }
 
+/// What is wrong with the first word, where it is no command of ours; empty: nothing.
+std::string unknown_command(const CLI::App& app, const std::vector<std::string>& words) {
+  std::vector<std::string> names;
+  for (const CLI::App* c : app.get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(c->get_name());
+  std::string list;
+  for (const auto& name : names) list += (list.empty() ? "" : ", ") + name;
+  if (words.empty()) return "no command: " + list;
+  if (words[0].empty() || words[0][0] == '-') return {};
+  if (std::find(names.begin(), names.end(), words[0]) != names.end()) return {};
+  const std::string guess = did_you_mean(words[0], names);
+  return "unknown command \"" + words[0] + "\"" + (guess.empty() ? ": " + list : guess);
+}
+
+/// The command that was given, for messages.
+std::string command_name(const CLI::App& app) {
+  const auto given = app.get_subcommands();
+  return given.empty() ? std::string() : given.front()->get_name() + ": ";
+}
+
+/// The first argument that no option takes; an option with the nearest one that there is.
+std::string unexpected(const CLI::App& app) {
+  const auto given = app.get_subcommands();
+  const CLI::App& command = given.empty() ? app : *given.front();
+  std::vector<std::string> known;
+  for (const CLI::Option* option : command.get_options())
+    for (const auto& name : option->get_lnames()) known.push_back("--" + name);
+  const auto rest = app.remaining(true);
+  for (const std::string& word : rest) {
+    if (word.size() < 2 || word[0] != '-') continue;
+    const std::string name = word.substr(0, word.find('='));
+    return command_name(app) + "unknown option " + name + did_you_mean(name, known);
+  }
+  return command_name(app) + "unexpected \"" + (rest.empty() ? "" : rest.front()) + "\"";
+}
+
+Parsed refused(const std::string& text) {
+  std::cerr << "error: " << text << " (--help shows an example and all options) ["
+            << "US106"
+            << "]\n";
+  Parsed parsed;
+  parsed.leave = true;
+  parsed.status = static_cast<int>(SMOOTHPOST_USAGE);
+  return parsed;
+}
+
 }  // namespace
 
 Parsed parse_command_line(int argc, char** argv) {
@@ -203,24 +278,55 @@ Parsed parse_command_line(int argc, char** argv) {
   CommandLine& l = parsed.line;
   CLI::App app("smoothpost: CAM programs to certified machine programs", "smoothpost");
   app.footer(kExample);
+  app.formatter(std::make_shared<ExampleFirst>());
   app.set_version_flag("--version", std::string("smoothpost ") + smoothpost_version());
   app.require_subcommand(1);
   add_convert(app, l);
   add_check(app, l);
   add_finish(app, l);
   add_place(app, l);
-  auto* machines =
-      add_words(app, l, "machines", "list | show NAME | validate FILE | test-program NAME");
-  machines->add_option("-o,--output", l.output, "test-program: the program; - for standard output");
-  machines->add_option("--tool", l.tool, "test-program: N=length in mm of the tool in the holder")
+  auto* machines = add_words(
+      app, l, "machines",
+      "list | show NAME | validate FILE | test-program NAME | import FILE | fit TABLE.csv");
+  machines->footer(
+      "Examples: a machine file from a robot description, and one from LinuxCNC's configuration:\n"
+      "  smoothpost machines import robot.urdf joint_limits.yaml -o machine.toml\n"
+      "  smoothpost machines import mill.ini A=table C=table -o machine.toml\n"
+      "Rotary centres from readings of a sphere, into a new file:\n"
+      "  smoothpost machines fit measured.csv fit=A.origin,C.origin -m machine.toml -o "
+      "fitted.toml\n"
+      "Is a file right, and does it say what the machine does:\n"
+      "  smoothpost machines validate machine.toml\n"
+      "  smoothpost machines test-program table_table_bc --tool 1=60 -o test.ngc\n");
+  machines->add_option("-o,--output", l.output,
+                       "test-program, import, fit: the file to write; - for standard output");
+  machines->add_option("-m,--machine", l.machine, "fit: the machine, a name or a machine.toml");
+  machines->add_option("--dialect", l.dialect, "import: output dialect of the machine file");
+  machines
+      ->add_option("--tool", l.tool, "test-program, fit: N=length in mm of the tool in the holder")
       ->allow_extra_args(false);
-  add_words(app, l, "formats", "input formats and output dialects");
-  add_words(app, l, "golden", "run DIR | update DIR: sample programs as regression cases");
+  add_words(app, l, "formats", "input formats and output dialects")
+      ->footer("Example:\n  smoothpost formats\n");
+  add_words(app, l, "golden", "run DIR | update DIR: sample programs as regression cases")
+      ->footer(
+          "Example: all folders with a case.toml below samples/:\n  smoothpost golden run "
+          "samples\n");
+  std::vector<std::string> words(argv + 1, argv + argc);
+  if (!words.empty() && words[0] == "help") {  // help convert: convert --help
+    words.erase(words.begin());
+    words.emplace_back("--help");
+  }
+  const std::string wrong = unknown_command(app, words);
+  if (!wrong.empty()) return refused(wrong);
   try {
-    app.parse(argc, argv);
+    app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
+  } catch (const CLI::ExtrasError&) {
+    return refused(unexpected(app));
   } catch (const CLI::ParseError& e) {
+    if (e.get_exit_code() != static_cast<int>(CLI::ExitCodes::Success))
+      return refused(command_name(app) + e.what());
     parsed.leave = true;
-    parsed.status = app.exit(e) == 0 ? 0 : static_cast<int>(SMOOTHPOST_USAGE);
+    parsed.status = app.exit(e);
     return parsed;
   }
   l.command = app.get_subcommands().front()->get_name();

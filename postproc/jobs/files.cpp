@@ -37,6 +37,8 @@ class Descriptor {
   int fd_;
 };
 
+constexpr int kMostLinks = 40;  // as the kernel follows
+
 bool write_all(int fd, std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t n = ::write(fd, bytes.data(), bytes.size());
@@ -56,9 +58,15 @@ Result<std::string> read_file(const std::string& path, std::size_t limit) {
   struct stat info {};
   if (::fstat(fd.get(), &info) == 0 && S_ISDIR(info.st_mode))
     return Result<std::string>::failure(system_error("US130", path, "cannot be read", EISDIR));
+  const auto too_large = [&] {
+    return Result<std::string>::failure(
+        system_error("US130", path, "is larger than " + std::to_string(limit) + " bytes", EFBIG));
+  };
   std::string bytes;
-  if (S_ISREG(info.st_mode) && info.st_size > 0)
-    bytes.reserve(std::min(static_cast<std::size_t>(info.st_size), limit) + 1);
+  if (S_ISREG(info.st_mode) && info.st_size > 0) {
+    if (static_cast<std::uintmax_t>(info.st_size) > limit) return too_large();
+    bytes.reserve(static_cast<std::size_t>(info.st_size) + 1);
+  }
   std::vector<char> buffer(1U << 20);
   while (true) {
     const ssize_t n = ::read(fd.get(), buffer.data(), buffer.size());
@@ -67,19 +75,32 @@ Result<std::string> read_file(const std::string& path, std::size_t limit) {
       return Result<std::string>::failure(system_error("US130", path, "cannot be read", errno));
     if (n == 0) return bytes;
     bytes.append(buffer.data(), static_cast<std::size_t>(n));
-    if (bytes.size() > limit)
-      return Result<std::string>::failure(
-          system_error("US130", path, "is larger than " + std::to_string(limit) + " bytes", EFBIG));
+    if (bytes.size() > limit) return too_large();
   }
+}
+
+Diagnostics check_target(const std::string& path) {
+  namespace fs = std::filesystem;
+  if (path.empty() || path == "-") return {};
+  std::error_code ignored;
+  if (fs::is_directory(path, ignored))
+    return {system_error("US131", path, "is a folder: name a file in it", EISDIR)};
+  const fs::path folder = fs::path(path).parent_path();
+  if (!folder.empty() && !fs::is_directory(folder, ignored))
+    return {system_error("US131", path, "cannot be written: no folder " + folder.string(),
+                         fs::exists(folder, ignored) ? ENOTDIR : ENOENT)};
+  return {};
 }
 
 Diagnostics write_file(const std::string& path, std::string_view bytes) {
   namespace fs = std::filesystem;
+  // Links are followed, also one whose file is not there yet.
   std::error_code ignored;
   fs::path target = path;
-  if (fs::is_symlink(target, ignored)) {
-    const fs::path real = fs::canonical(target, ignored);
-    if (!ignored) target = real;
+  for (int links = 0; fs::is_symlink(target, ignored); ++links) {
+    if (links == kMostLinks) return {system_error("US131", path, "cannot be written", ELOOP)};
+    const fs::path next = fs::read_symlink(target, ignored);
+    target = next.is_absolute() ? next : target.parent_path() / next;
   }
   // Devices and pipes take the bytes as they are: there is nothing to rename over.
   struct stat info {};

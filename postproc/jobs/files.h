@@ -11,6 +11,10 @@ namespace smoothpost {
 /// files of more than `limit` bytes.
 Result<std::string> read_file(const std::string& path, std::size_t limit = std::size_t{2} << 30);
 
+/// What forbids a file of that name before any work is done for it: it is a folder, or its own
+/// folder is not there. "-" and nothing are fine. US131.
+Diagnostics check_target(const std::string& path);
+
 /// Writes a file so that at any moment `path` holds either its old content or all of the new: a
 /// temporary beside it, flushed to the disk, renamed. A symbolic link is followed. Fails with
 /// US131.

@@ -42,7 +42,14 @@ std::string decimal(double value, int digits) {
 /// One run of convert or check: reads the options, runs the pipeline, writes the files.
 class Run {
  public:
-  Run(const Options& options, const Progress& progress) : options_(options), progress_(progress) {}
+  Run(const Options& options, const Progress& progress) : options_(options) {
+    progress_.report = [this, &progress](const char* stage, double share) {
+      cancelled_ = cancelled_ || !progress(stage, share);
+      return !cancelled_;
+    };
+  }
+  Run(const Run&) = delete;  // progress_ refers to it
+  Run& operator=(const Run&) = delete;
 
   JobResult convert_command() {
     if (!options_make_sense() || !load_output_machine() || !load_input()) return finish();
@@ -161,6 +168,9 @@ class Run {
   bool options_make_sense() {
     if (!options_.links.empty() && options_.links != "plan" && options_.links != "keep")
       add(usage_error("US148", "--links " + options_.links + ": expected is plan or keep"));
+    for (const std::string& path : {options_.output, options_.json, options_.report,
+                                    options_.line_map, options_.trajectory, options_.stock_out})
+      add(check_target(path));
     return !has_error(result_.diagnostics);
   }
 
@@ -177,6 +187,10 @@ class Run {
     add(machine.diagnostics());
     if (!machine.ok()) return false;
     machine_ = std::move(machine.value());
+    if (!find_dialect(machine_.definition.dialect.name)) {
+      add(no_dialect(machine_.definition.dialect.name));
+      return false;
+    }
     context_.machine = machine_.definition.name;
     context_.dialect = machine_.definition.dialect.name;
     std::string with_overrides = machine_.text;
@@ -300,6 +314,7 @@ class Run {
       unreadable_ = true;
       return false;
     }
+    context_.input_files.push_back({base_name(options_.against), sha256(bytes.value())});
     in.against = read_cam_program(options_.against, std::move(bytes.value()));
     return in.against.has_value();
   }
@@ -326,6 +341,8 @@ class Run {
     add(read.diagnostics());
     if (!read.ok()) return {};
     context_.input_dialect = read.value().dialect;
+    const auto& files = read.value().files;
+    context_.input_files.insert(context_.input_files.end(), files.begin(), files.end());
     return std::move(read.value());
   }
 
@@ -350,10 +367,17 @@ class Run {
 
   bool input_settings(InputSettings& settings) {
     if (!read_dialect(settings)) return false;
-    if (!options_.input_data && options_.input != "-") {
-      const auto folder = fs::path(options_.input).parent_path();
+    const bool from_file =
+        !options_.against.empty() || (!options_.input_data && options_.input != "-");
+    if (from_file) {
+      const auto folder = fs::path(settings.file_name).parent_path();
       settings.subroutine_folders = {folder.empty() ? "." : folder.string()};
     }
+    const auto bounds = read_run_bounds(options_);
+    add(bounds.diagnostics());
+    if (!bounds.ok()) return false;
+    settings.run_budget = bounds.value().run_budget;
+    settings.call_depth = bounds.value().call_depth;
     auto cl = read_cl_options(options_);
     add(cl.diagnostics());
     if (!cl.ok()) return false;
@@ -568,6 +592,11 @@ class Run {
 
   JobResult finish() {
     context_.version = kVersion;
+    const bool good = verdict_ && *verdict_ != Verdict::refused;
+    const auto told = [](const Diagnostic& d) { return d.code == "US190"; };
+    const auto& list = result_.diagnostics;
+    if (cancelled_ && !good && std::none_of(list.begin(), list.end(), told))
+      add(usage_error("US190", "cancelled"));
     if (!verdict_) report_failure();
     result_.status = status_of(result_.diagnostics);
     if (unreadable_) result_.status = ExitStatus::unreadable;
@@ -578,10 +607,12 @@ class Run {
 
   void write_files() {
     const auto write = [this](const std::string& path, const std::string& bytes) {
-      if (path.empty() || path == "-" || bytes.empty()) return;
+      if (path.empty() || path == "-" || bytes.empty()) return true;
+      if (!check_target(path).empty()) return false;  // told at the start
       const Diagnostics errors = write_file(path, bytes);
       add(errors);
       if (has_error(errors)) result_.status = ExitStatus::usage;
+      return !has_error(errors);
     };
     write(options_.json, result_.report);
     write(options_.report, result_.page);
@@ -594,7 +625,7 @@ class Run {
     write(options_.trajectory, result_.trajectory);
     if (result_.program.empty() || options_.output == "-") return;
     result_.program_path = options_.output.empty() ? default_output() : options_.output;
-    write(result_.program_path, result_.program);
+    if (!write(result_.program_path, result_.program)) result_.program_path.clear();
   }
 
   // The input's stem in the working directory with the dialect's extension, never the input itself.
@@ -610,7 +641,8 @@ class Run {
   }
 
   const Options& options_;
-  const Progress& progress_;
+  Progress progress_;
+  bool cancelled_ = false;
   JobResult result_;
   LoadedMachine machine_;
   std::string input_name_;

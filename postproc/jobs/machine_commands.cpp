@@ -7,6 +7,8 @@
 #include "kernels/core/units.h"
 #include "machines/dialects/decimal.h"
 #include "postproc/jobs/files.h"
+#include "postproc/jobs/fit_command.h"
+#include "postproc/jobs/import_command.h"
 #include "postproc/jobs/settings.h"
 #include "postproc/pipeline/registry.h"
 #include "postproc/pipeline/test_program.h"
@@ -122,9 +124,13 @@ void write_test_program(const MachineDefinition& machine, const Options& options
 JobResult run_machines_command(const Options& options) {
   const auto& words = options.arguments;
   if (words.empty() || words[0] == "list") return list(options);
+  if (words[0] == "import") return run_import_command(options);
+  if (words[0] == "fit") return run_fit_command(options);
   if (words.size() != 2 ||
       (words[0] != "show" && words[0] != "validate" && words[0] != "test-program"))
-    return usage("machines: list, show NAME, validate FILE or test-program NAME");
+    return usage(
+        "machines: list, show NAME, validate FILE, test-program NAME, import FILE or fit "
+        "MEASURED.csv");
   JobResult result;
   const auto overrides = overrides_of(options);
   if (!overrides.ok()) {
@@ -141,9 +147,7 @@ JobResult run_machines_command(const Options& options) {
     return result;
   }
   if (!find_dialect(machine.value().definition.dialect.name)) {
-    result.diagnostics.push_back(
-        usage_error("US121", "no output dialect \"" + machine.value().definition.dialect.name +
-                                 "\" in this version: `smoothpost formats` lists them"));
+    result.diagnostics.push_back(no_dialect(machine.value().definition.dialect.name));
     result.status = ExitStatus::usage;
     return result;
   }
@@ -156,7 +160,8 @@ JobResult run_machines_command(const Options& options) {
   return result;
 }
 
-JobResult run_formats_command(const Options&) {
+JobResult run_formats_command(const Options& options) {
+  if (!options.arguments.empty()) return usage("formats takes no further words");
   JobResult result;
   result.text = "input formats (--input-format):\n";
   for (const auto& f : input_formats())

@@ -4,7 +4,8 @@
 
 namespace smoothpost {
 
-/// machines list | show NAME | validate FILE | test-program NAME: what machine files there are, one
+/// machines list | show NAME | validate FILE | test-program NAME | import FILE (import_command.h) |
+/// fit MEASURED.csv (fit_command.h): what machine files there are, one
 /// in words, one checked, and a slow program that proves one on its machine (--tool N=length, -o).
 JobResult run_machines_command(const Options& options);
 

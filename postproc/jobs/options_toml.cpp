@@ -26,6 +26,8 @@ const std::map<std::string, std::string Options::*>& text_options() {
       {"input_feed", &Options::input_feed},
       {"cl_frames", &Options::cl_frames},
       {"cl_circles", &Options::cl_circles},
+      {"run_budget", &Options::run_budget},
+      {"call_depth", &Options::call_depth},
       {"input_machine", &Options::input_machine},
       {"process", &Options::process},
       {"tip_tolerance", &Options::tip_tolerance},

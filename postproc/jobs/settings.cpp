@@ -9,15 +9,20 @@
 #include <filesystem>
 
 #include "formats/mesh/stl_reader.h"
+#include "kernels/core/nearest_name.h"
 #include "kernels/core/units.h"
 #include "kernels/geometry/weld.h"
 #include "postproc/jobs/files.h"
+#include "postproc/pipeline/registry.h"
 
 namespace smoothpost {
 
 namespace fs = std::filesystem;
 
 namespace {
+
+constexpr double kMostTolerance = 1000.0;  // mm or deg
+constexpr double kFurthest = 1e6;          // mm or deg, of a work offset
 
 std::vector<std::string> split(std::string_view text, char separator) {
   std::vector<std::string> parts;
@@ -65,6 +70,14 @@ Diagnostic usage_error(const char* code, std::string text) {
   return d;
 }
 
+Diagnostic no_dialect(const std::string& name) {
+  std::vector<std::string> names;
+  for (const auto& row : dialects()) names.emplace_back(row.name);
+  const std::string guess = did_you_mean(name, names);
+  return usage_error("US121", "no output dialect \"" + name + "\"" + (guess.empty() ? ":" : guess) +
+                                  " `smoothpost formats` lists them");
+}
+
 std::optional<double> read_number(std::string_view text) {
   while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
   while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
@@ -73,6 +86,27 @@ std::optional<double> read_number(std::string_view text) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return {};
   return value;
+}
+
+Result<RunBounds> read_run_bounds(const Options& options) {
+  RunBounds bounds;
+  Diagnostics errors;
+  const auto whole = [&errors](const std::string& text, const char* option, double largest) {
+    std::optional<double> value;
+    if (text.empty()) return value;
+    value = read_number(text);
+    if (!value || *value != std::floor(*value) || *value < 0.0 || *value > largest)
+      errors.push_back(usage_error("US172", std::string(option) + " " + text +
+                                                ": expected is a whole number from 0 to " +
+                                                std::to_string(static_cast<long long>(largest))));
+    return value;
+  };
+  const auto budget = whole(options.run_budget, "--run-budget", 1e12);
+  const auto depth = whole(options.call_depth, "--call-depth", 1000.0);
+  if (!errors.empty()) return Result<RunBounds>::failure(std::move(errors));
+  if (budget) bounds.run_budget = static_cast<std::uint64_t>(*budget);
+  if (depth) bounds.call_depth = static_cast<int>(*depth);
+  return bounds;
 }
 
 std::vector<std::string> machine_folders(const Options& options) {
@@ -98,7 +132,9 @@ Result<LoadedMachine> load_machine(const std::string& name_or_file, const Option
                                    const std::vector<MachineOverride>& overrides) {
   std::string path;
   std::error_code error;
-  if (name_or_file.find('/') != std::string::npos || name_or_file.ends_with(".toml")) {
+  if (fs::is_regular_file(fs::path(name_or_file) / "machine.toml", error)) {
+    path = (fs::path(name_or_file) / "machine.toml").string();
+  } else if (name_or_file.find('/') != std::string::npos || name_or_file.ends_with(".toml")) {
     path = name_or_file;
   } else {
     for (const auto& folder : machine_folders(options)) {
@@ -111,12 +147,19 @@ Result<LoadedMachine> load_machine(const std::string& name_or_file, const Option
   }
   if (path.empty()) {
     std::string where;
-    for (const auto& folder : machine_folders(options))
+    std::vector<std::string> names;
+    for (const auto& folder : machine_folders(options)) {
       where += (where.empty() ? "" : ", ") + folder;
-    return Result<LoadedMachine>::failure(
-        usage_error("US140", "no machine named \"" + name_or_file + "\" in " +
-                                 (where.empty() ? "any folder" : where) +
-                                 ": `smoothpost machines list` shows what there is"));
+      for (const auto& entry : fs::directory_iterator(folder, error))
+        if (fs::exists(entry.path() / "machine.toml", error))
+          names.push_back(entry.path().filename().string());
+    }
+    std::sort(names.begin(), names.end());
+    const std::string guess = did_you_mean(name_or_file, names);
+    return Result<LoadedMachine>::failure(usage_error(
+        "US140", "no machine named \"" + name_or_file + "\" in " +
+                     (where.empty() ? "any folder" : where) + (guess.empty() ? ":" : guess) +
+                     " `smoothpost machines list` shows what there is"));
   }
   auto bytes = read_file(path, std::size_t{16} << 20);
   if (!bytes.ok()) return Result<LoadedMachine>::failure(bytes.diagnostics());
@@ -134,10 +177,19 @@ Result<std::vector<MachineOverride>> overrides_of(const Options& options) {
   const auto add = [&overrides](const char* key, const std::string& value) {
     if (!value.empty()) overrides.push_back({key, value});
   };
-  add("tolerance.tip_mm", options.tip_tolerance);
-  add("tolerance.axis_deg", options.axis_tolerance);
-  add("tolerance.lead_deg", options.lead);
-  add("tolerance.tilt_deg", options.tilt);
+  const auto number = [&](const char* key, const char* option, const std::string& value) {
+    const auto read = read_number(value);
+    if (!value.empty() && (!read || *read < 0.0 || *read > kMostTolerance))
+      errors.push_back(usage_error(
+          "US173",
+          std::string(option) + " " + value + ": a number from 0 to 1000 is expected, mm or deg"));
+    else
+      add(key, value);
+  };
+  number("tolerance.tip_mm", "--tip-tolerance", options.tip_tolerance);
+  number("tolerance.axis_deg", "--axis-tolerance", options.axis_tolerance);
+  number("tolerance.lead_deg", "--lead", options.lead);
+  number("tolerance.tilt_deg", "--tilt", options.tilt);
   add("recipe.smoothing", options.smoothing);
   add("recipe.orientation", options.orientation);
   add("recipe.optimise", options.optimise);
@@ -168,7 +220,7 @@ Result<std::vector<OffsetOption>> read_offsets(const std::vector<std::string>& t
     if (good)
       for (const auto& part : split(std::string_view(text).substr(at + 1), ',')) {
         const auto value = read_number(part);
-        if (value)
+        if (value && std::abs(*value) <= kFurthest)
           numbers.push_back(*value);
         else
           good = false;

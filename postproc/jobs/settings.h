@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -53,9 +54,20 @@ Result<ToolTable> read_tools(const std::vector<std::string>& texts);
 /// --input-unit, --input-feed, --cl-frames, --cl-circles. US162 to US165.
 Result<cl::ReaderSettings> read_cl_options(const Options& options);
 
+/// How far an NC program may run beyond its own text; nothing: the interpreter's defaults.
+struct RunBounds {
+  std::optional<std::uint64_t> run_budget;
+  std::optional<int> call_depth;
+};
+/// --run-budget (0 to 1e12), --call-depth (0 to 1000). US172.
+Result<RunBounds> read_run_bounds(const Options& options);
+
 /// A finite decimal number; nothing for anything else.
 std::optional<double> read_number(std::string_view text);
 
 Diagnostic usage_error(const char* code, std::string text);
+
+/// US121: no output dialect of that name, with the nearest one.
+Diagnostic no_dialect(const std::string& name);
 
 }  // namespace smoothpost

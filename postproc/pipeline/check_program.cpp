@@ -5,6 +5,7 @@
 #include "postproc/pipeline/clearance_check.h"
 #include "postproc/pipeline/controller_blending.h"
 #include "postproc/pipeline/conversion_parts.h"
+#include "postproc/pipeline/orientation_check.h"
 #include "postproc/pipeline/path_match.h"
 #include "postproc/pipeline/registry.h"
 #include "postproc/pipeline/tool_motion.h"
@@ -12,6 +13,11 @@
 namespace smoothpost {
 
 namespace {
+
+// Of an axis that leans by up to 60 deg: what its projection turns, and the edge behind a sheet
+// moves, more than the axis does (kLeastProjection of path_match.cpp).
+constexpr double kProjected = 2.0;
+constexpr double kSteepest = 4.0;
 
 /// A program with the joints of its tool moves, as joint steps, and how far these may be from what
 /// the control does.
@@ -33,19 +39,36 @@ double largest_turn_allowance(const ReadBack& read, const ScrewChain& chain, Too
   return largest;
 }
 
+/// The tolerances of a beam whose orientation is free, as the matching takes them.
+FreedBeam freed_beam(const CheckInput& in, const ReferencePath& reference,
+                     const std::vector<Cut>& cuts, const TriangleTree* part, double allowance) {
+  const ToleranceSettings& tolerance = in.machine.tolerance;
+  FreedBeam beam;
+  for (const Cut& cut : cuts)
+    if (!cut.omitted) beam.frames.emplace_back(reference, cut.first, cut.last, part);
+  beam.lead = std::max(tolerance.lead, tolerance.axis) - allowance;
+  beam.tilt = std::max(tolerance.tilt, tolerance.axis) - allowance;
+  beam.thickness = in.machine.workpiece.thickness;
+  if (tolerance.exit_edge)
+    beam.exit_edge = std::max(1e-9, *tolerance.exit_edge - kSteepest * beam.thickness * allowance);
+  return beam;
+}
+
 /// The shape of a program against its input, as checks. The matching bounds the larger of the two
 /// shares of the tolerances, so both deviations are told as that share of theirs.
 Checks shape_checks(const CheckInput& in, const FollowedProgram& program, const ScrewChain& chain,
-                    const Progress& progress) {
+                    const TriangleTree* tree, const Progress& progress) {
   const ReadBack& read = program.read;
   ToolPath path = in.against->path;
-  find_cuts(path, {false, in.machine.links.micro_joint, {}});
+  const std::vector<Cut> cuts = find_cuts(path, {false, in.machine.links.micro_joint, {}});
   const ReferencePath reference(path, in.against->frames);
   const auto& tolerance = in.machine.tolerance;
   const bool beam = std::any_of(path.points.begin(), path.points.end(),
                                 [](const PathPoint& p) { return p.beam; });
   const double tip = tolerance.tip - program.tip_allowance;
-  const double axis = tolerance.axis - program.axis_allowance;
+  const bool free = orientation_is_free(in.machine);
+  const double allowance = (free ? kProjected : 1.0) * program.axis_allowance;
+  const double axis = tolerance.axis - allowance;
   PathMatch match;
   match.reason =
       "the blocks are too long for this axis tolerance: what the control does between "
@@ -54,26 +77,38 @@ Checks shape_checks(const CheckInput& in, const FollowedProgram& program, const 
   settings.beam = beam;
   const bool whole = in.machine.recipe.task == "pose";
   if (whole) settings.whole_rotation = input_tool_rotation(chain.tool_axis, in.machine.recipe.spin);
+  if (free && axis > 0.0) settings.freed = freed_beam(in, reference, cuts, tree, allowance);
   if (whole && !path.full_pose)
     match.reason = "recipe.task = \"pose\" needs an input with whole rotations";
   else if (tip > 0.0 && axis > 0.0)
     match = match_paths(read, chain, reference, settings, progress);
-  const auto check = [&](const char* name, double limit, double allowance, const char* unit) {
+  const auto check = [&](const char* name, double limit, double taken, const char* unit) {
     Check c;
     c.name = name;
     c.limit = limit;
     c.unit = unit;
     c.ok = match.matched;
-    c.value = match.matched ? match.share * (limit - allowance) + allowance : INFINITY;
+    c.value = match.matched ? match.share * (limit - taken) + taken : INFINITY;
     c.input_line = match.input_line;
     c.output_line = match.output_line;
     c.note = match.reason;
     return c;
   };
-  return {
-      check("tip_deviation", tolerance.tip, program.tip_allowance, "mm"),
-      check(whole ? "rotation_deviation" : "axis_deviation", degrees_from_radians(tolerance.axis),
-            degrees_from_radians(program.axis_allowance), "deg")};
+  const Check tip_check = check("tip_deviation", tolerance.tip, program.tip_allowance, "mm");
+  if (settings.freed) {
+    const FreedBeam& freed = *settings.freed;
+    const double allowed = degrees_from_radians(allowance);
+    const double lead = degrees_from_radians(freed.lead), tilt = degrees_from_radians(freed.tilt);
+    Checks checks = {tip_check, check("lead_deviation", lead + allowed, allowed, "deg"),
+                     check("tilt_deviation", tilt + allowed, allowed, "deg")};
+    if (freed.exit_edge)
+      checks.push_back(check("exit_edge_deviation", *tolerance.exit_edge,
+                             *tolerance.exit_edge - *freed.exit_edge, "mm"));
+    return checks;
+  }
+  return {tip_check, check(whole ? "rotation_deviation" : "axis_deviation",
+                           degrees_from_radians(tolerance.axis),
+                           degrees_from_radians(program.axis_allowance), "deg")};
 }
 
 /// Joints of tool moves; the tool's length is the one that the program's own tool frame has, or the
@@ -167,20 +202,27 @@ Conversion check_program(const CheckInput& in, const Progress& progress) {
   Verification machine = verify_machine(program.read, in.machine);
   out.axes = std::move(machine.axes);
   out.scheduled_time = machine.scheduled_time;
+  std::optional<PartCheck> part;
+  if (in.part) part.emplace(*in.part, in.machine);
+  const std::shared_ptr<const TriangleTree> tree = part ? part->shared_tree() : nullptr;
   if (in.against) {
-    out.checks = shape_checks(in, program, chain, progress);
+    out.checks = shape_checks(in, program, chain, tree.get(), progress);
+    if (orientation_is_free(in.machine)) {
+      out.assumes.push_back(
+          "lead and tilt of the beam are free inside their tolerances; they are counted from the "
+          "programmed tool axis, in the plane of the cut's direction and " +
+          std::string(tree ? "the part's normal" : "the programmed tool axis (no part was given)"));
+      out.not_checked.push_back("tilted_gap");
+    }
     out.reference = in.against->reference;
     out.assumes.insert(out.assumes.begin(), in.against->assumes.begin(), in.against->assumes.end());
   }
   out.checks.insert(out.checks.end(), machine.checks.begin(), machine.checks.end());
   out.read = std::move(program.read);
-  std::shared_ptr<const TriangleTree> tree;
-  if (in.part) {
-    const PartCheck part(*in.part, in.machine);
-    append(out.diagnostics, part.diagnostics());
-    if (part.ok() && !beam_locations(out.read, chain).empty())
-      out.checks.push_back(part.output(out.read, chain));
-    tree = part.shared_tree();
+  if (part) {
+    append(out.diagnostics, part->diagnostics());
+    if (part->ok() && !beam_locations(out.read, chain).empty())
+      out.checks.push_back(part->output(out.read, chain));
   }
   if (in.collision_check)
     add_clearance({in.machine, chain, in.part ? &*in.part : nullptr, tree,

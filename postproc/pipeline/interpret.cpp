@@ -7,6 +7,7 @@
 #include "formats/nc/dialect_detection.h"
 #include "formats/nc/parser.h"
 #include "kernels/core/units.h"
+#include "postproc/pipeline/hash.h"
 
 namespace smoothpost {
 
@@ -423,6 +424,8 @@ nc::InterpreterSettings interpreter_settings(const InputSettings& settings) {
   s.tool_lengths = settings.tool_lengths;
   s.integer_increment = settings.integer_unit;
   s.subroutine_folders = settings.subroutine_folders;
+  s.run_budget = settings.run_budget.value_or(s.run_budget);
+  s.call_depth = settings.call_depth.value_or(s.call_depth);
   s.work_offsets = settings.work_offsets;
   if (settings.machine) {
     s.axes = 0;
@@ -521,6 +524,8 @@ Result<InterpretedInput> interpret_nc(std::string text, const InputSettings& set
   if (!built.ok()) return Result<InterpretedInput>::failure(std::move(diagnostics));
   built.value().lines = parsed.program.blocks.size();
   built.value().dialect = dialect_name(dialect.value());
+  for (const auto& file : summary.value().files)
+    built.value().files.push_back({file.name, sha256(file.text)});
   return Result<InterpretedInput>(std::move(built.value()), std::move(diagnostics));
 }
 

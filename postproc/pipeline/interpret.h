@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -25,12 +26,20 @@ struct InputSettings {
   /// fanuc, haas: mm or deg that one unit of a number without point is; nothing: refused
   std::optional<double> integer_unit;
   std::vector<std::string> subroutine_folders;  ///< where NC text may find files of subroutines
+  std::optional<std::uint64_t> run_budget;      ///< nothing: InterpreterSettings::run_budget
+  std::optional<int> call_depth;                ///< nothing: InterpreterSettings::call_depth
   cl::ReaderSettings cl;  ///< of CL data; its process table is taken from the members above
 };
 
 /// The name of --input-dialect, and the dialect of that name.
 std::string dialect_name(nc::InputDialect dialect);
 std::optional<nc::InputDialect> input_dialect(std::string_view name);
+
+/// A file that the input calls, by its content.
+struct InputFile {
+  std::string name;  ///< without its folder
+  std::string sha256;
+};
 
 /// The input as a tool path in the part, with the frames that its words were read in.
 struct InterpretedInput {
@@ -40,8 +49,9 @@ struct InterpretedInput {
   std::string reference;             ///< how the input is interpolated, for the certificate
   std::string dialect;               ///< of NC text: linuxcnc, fanuc ...
   std::size_t lines = 0;
-  bool uses_tools = false;  ///< a tool was changed or compensated
-  int system = 1;           ///< work system of the first motion, 1..9 for G54..G59.3
+  std::vector<InputFile> files;  ///< of subroutines that were read, in the order of their calls
+  bool uses_tools = false;       ///< a tool was changed or compensated
+  int system = 1;                ///< work system of the first motion, 1..9 for G54..G59.3
 };
 
 /// Reads NC text: parse, modal interpretation, then the input machine's kinematics.

@@ -28,6 +28,8 @@ struct Options {
   std::string input_feed;    ///< cl: mm/min, of feed motions before FEDRAT
   std::string cl_frames;     ///< cl: one | reported | applied
   std::string cl_circles;    ///< cl: tangents | cw | ccw, CIRCLE of the NX form about its axis
+  std::string run_budget;    ///< nc: blocks that loops, calls and cycles may run beyond the text
+  std::string call_depth;    ///< nc: calls within each other
   std::string input_machine;
   std::string process;
   std::vector<std::string> work_offset;        ///< G54=x,y,z[,a,b,c] | auto: on the output machine

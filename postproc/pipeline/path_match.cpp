@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "kernels/core/contract.h"
+#include "kernels/core/units.h"
 
 namespace smoothpost {
 
@@ -14,24 +15,34 @@ namespace {
 constexpr double kStep = 0.25;       // of the tolerances, between samples
 constexpr double kAllowance = 0.02;  // of the tolerances, for curves between samples
 constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr double kLeastProjection = 0.5;  // of an axis into the plane that lead or tilt is seen in
 
 struct Sample {
   CutterLocation location;
   std::uint32_t line = 0;
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // of whole rotations
+  std::optional<CuttingFrame> frame = {};  // of the input, where the beam is freed
+  double turn = 0.0;                       // of the frame to the neighbours, rad
 };
 
 /// Distances in shares of the tolerances.
 class Metric {
  public:
   explicit Metric(const PathMatchSettings& s)
-      : tip_(s.tip_tolerance), axis_(s.axis_tolerance), whole_(s.whole_rotation) {}
+      : tip_(s.tip_tolerance),
+        axis_(s.axis_tolerance),
+        whole_(s.whole_rotation),
+        freed_(s.freed ? &*s.freed : nullptr) {}
+  /// Of a program's sample and one of the input, or of two neighbours.
   double between(const Sample& a, const Sample& b) const {
+    if (b.frame)
+      return std::max((a.location.tip - b.location.tip).norm() / tip_, leaning(a.location.axis, b));
     const double turn = whole_ ? a.rotation.angularDistance(b.rotation)
                                : angle_between(a.location.axis, b.location.axis);
     return std::max((a.location.tip - b.location.tip).norm() / tip_, turn / axis_);
   }
   const std::optional<Mat3>& whole() const { return whole_; }
+  const FreedBeam* freed() const { return freed_; }
   double bend(const SecondDerivativeBound& b) const {
     return std::max(b.tip / tip_, b.axis / axis_);
   }
@@ -45,9 +56,34 @@ class Metric {
   }
 
  private:
+  /// Lead, tilt and exit edge of an axis at a place of the input, the largest share of their
+  /// tolerances.
+  double leaning(const Vec3& axis, const Sample& place) const {
+    const CuttingFrame& frame = *place.frame;
+    const LeadTilt got = frame.angles(axis);
+    // An axis that moves by ε turns its projection by up to ε/cos; kAllowance has the ε.
+    const double across = std::hypot(axis.dot(frame.normal), axis.dot(frame.tangent));
+    const double along = std::hypot(axis.dot(frame.normal), axis.dot(frame.binormal));
+    if (std::min(across, along) < kLeastProjection || axis.dot(frame.normal) <= 0.0) return kNever;
+    const double lead = std::abs(got.lead - frame.programmed.lead);
+    const double tilt = std::abs(got.tilt - frame.programmed.tilt);
+    const double turned = 0.125 * place.turn * place.turn * std::hypot(lead, tilt);
+    double share = std::max((lead + turned) / freed_->lead + kAllowance * (1.0 / across - 1.0),
+                            (tilt + turned) / freed_->tilt + kAllowance * (1.0 / along - 1.0));
+    if (freed_->exit_edge) {
+      const double most = std::max(std::abs(got.tilt), std::abs(frame.programmed.tilt));
+      const double slope = 1.0 / (std::cos(most) * std::cos(most));  // of the tangent
+      share = std::max(
+          share, freed_->thickness * slope * (tilt + turned) / *freed_->exit_edge +
+                     kAllowance * freed_->thickness * slope * axis_ / along / *freed_->exit_edge);
+    }
+    return share;
+  }
+
   double tip_;
   double axis_;
   std::optional<Mat3> whole_;
+  const FreedBeam* freed_;
 };
 
 Sample input_sample(const ReferencePath& input, std::size_t segment, double s,
@@ -55,6 +91,26 @@ Sample input_sample(const ReferencePath& input, std::size_t segment, double s,
   Sample sample{input.at(segment, s), input.path().points[segment].line};
   if (metric.whole()) sample.rotation = input.rotation_at(segment, s);
   return sample;
+}
+
+/// The frame at a place; nothing when the beam is not freed there.
+std::optional<CuttingFrame> frame_at(const Metric& metric, std::size_t segment, double s) {
+  if (metric.freed() == nullptr) return {};
+  const auto k = static_cast<std::uint32_t>(segment);
+  for (const CuttingFrames& frames : metric.freed()->frames)
+    if (k >= frames.first() && k <= frames.last()) return frames.at({k, s});
+  return {};
+}
+
+/// How far the frames turn from one sample to the next, at the samples on both sides.
+void add_turns(std::vector<Sample>& samples) {
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    if (!samples[i].frame || !samples[i - 1].frame) continue;
+    const double turn = angle_between(samples[i - 1].frame->tangent, samples[i].frame->tangent);
+    if (turn >= 0.5 * kPi) continue;  // turns back: nothing lies between
+    samples[i].turn = std::max(samples[i].turn, turn);
+    samples[i - 1].turn = std::max(samples[i - 1].turn, turn);
+  }
 }
 
 /// The program's moves as samples, one after the other, without keeping them.
@@ -124,15 +180,19 @@ std::vector<Sample> input_samples(const ReferencePath& input, std::size_t first,
   const auto& points = input.path().points;
   std::vector<Sample> samples;
   samples.push_back({points[first].location, points[first].line, points[first].rotation});
+  samples.back().frame = frame_at(metric, first + 1, 0.0);
   for (std::size_t k = first + 1; k <= last; ++k) {
     const double bend = metric.bend(input.second_derivative_bound(k));
     const int n = metric.steps(
         metric.between(input_sample(input, k, 0.0, metric), input_sample(input, k, 1.0, metric)) +
             bend,
         bend);
-    for (int i = 1; i <= n; ++i)
+    for (int i = 1; i <= n; ++i) {
       samples.push_back(input_sample(input, k, static_cast<double>(i) / n, metric));
+      samples.back().frame = frame_at(metric, k, static_cast<double>(i) / n);
+    }
   }
+  add_turns(samples);
   return samples;
 }
 
@@ -303,6 +363,9 @@ class Matcher {
 PathMatch match_paths(const ReadBack& program, const ScrewChain& chain, const ReferencePath& input,
                       const PathMatchSettings& settings, const Progress& progress) {
   require(settings.tip_tolerance > 0.0 && settings.axis_tolerance > 0.0, "positive tolerances");
+  require(!settings.freed || (settings.freed->lead >= settings.axis_tolerance &&
+                              settings.freed->tilt >= settings.axis_tolerance),
+          "a freed beam's tolerances are at least the axis'");
   return Matcher(program, chain, input, settings, progress).run();
 }
 

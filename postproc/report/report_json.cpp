@@ -293,6 +293,8 @@ std::string report_json(const Conversion& c, const ReportContext& context) {
                       {"input_sha256", context.input_sha256},
                       {"program_sha256", context.program_sha256},
                       {"machine_sha256", context.machine_sha256}};
+  for (const InputFile& file : context.input_files)
+    j["certificate"]["input_files"].push_back({{"file", file.name}, {"sha256", file.sha256}});
   j["input"] = {{"file", context.input_file},
                 {"format", context.input_format},
                 {"dialect", context.input_dialect},

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "postproc/pipeline/convert.h"
+#include "postproc/pipeline/interpret.h"
 
 namespace smoothpost {
 
@@ -33,6 +34,7 @@ struct ReportContext {
   std::size_t input_lines = 0;
   std::size_t cutter_locations = 0;
   std::string input_sha256;
+  std::vector<InputFile> input_files;  ///< besides it: what `check` compares with, and subroutines
   std::string program_sha256;
   std::string machine_sha256;
   bool timings = false;

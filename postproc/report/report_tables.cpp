@@ -259,6 +259,8 @@ std::string machine_html(const PageInput& in) {
                       std::to_string(context.cutter_locations) + " cutter locations, " +
                       short_number(c.length, 6) + " mm");
   table.row("SHA-256 of input", context.input_sha256);
+  for (const InputFile& file : context.input_files)
+    table.row("SHA-256 of " + file.name, file.sha256);
   table.row("SHA-256 of program", context.program_sha256);
   table.row("SHA-256 of machine file", context.machine_sha256);
   if (context.placement) table.row("Place of the part, found", context.placement->work_offset);

@@ -164,13 +164,18 @@ TEST_CASE("corpus: pmill_test1_4.as has 3716 tool axes and 2244 below the horizo
   REQUIRE(r.ok);
   CHECK(r.sink.motions.size() == 3716);
   std::size_t below = 0;
-  double tilt = 0.0;
+  double tilt = 0.0, turned = 0.0;
+  // With --work-offset G54=x,y,z,-87.810872771,-10.508722643,0 they fit a cap about the vertical.
+  const Mat3 turn = rotation_from_rpy(radians_from_degrees(-87.810872771),
+                                      radians_from_degrees(-10.508722643), 0.0);
   for (const CanonicalMotion& m : r.sink.motions) {
     below += m.end_axis.z() < 0.0 ? 1 : 0;
     tilt = std::max(tilt, angle_between(m.end_axis, Vec3::UnitZ()));
+    turned = std::max(turned, angle_between(turn * m.end_axis, Vec3::UnitZ()));
   }
   CHECK(below == 2244);
   CHECK(degrees_from_radians(tilt) == Approx(175.0).margin(1.0));
+  CHECK(degrees_from_radians(turned) == Approx(87.848).margin(0.002));
   CHECK((end_of(r.sink.motions[0]) - 25.4 * Vec3(-3.4701, -4.5099, -2.0664)).norm() < 1e-9);
 }
 

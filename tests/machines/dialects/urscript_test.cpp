@@ -50,6 +50,44 @@ TEST_CASE("urscript: movep at both sides of a rounded corner, movel elsewhere",
   CHECK(stops.find("movel" + target + "0.1, 0, 0, 0, 0, 0]), t=2)") != std::string::npos);
 }
 
+TEST_CASE("urscript: programs of others in the base frame", "[machines][dialects]") {
+  const auto machine = arm();
+  const auto own = emitted(urscript::kDialect, machine, short_arm_program(machine)).text;
+  const auto tcp =
+      own.substr(own.find("set_tcp"), own.find('\n', own.find("set_tcp")) - own.find("set_tcp"));
+  const std::string text = "# of another post\n\ndef job():\n\t" + tcp +
+                           "\n    movej([0, -1.5, 1.5, 0, 0.7, 0], a=1.4, v=1.05)\n"
+                           "    movel(p[1.5, 0.1, 0.8, 0, 0, 0], a=1.2, v=0.1)\n"
+                           "    movep(p[1.5, 0.2, 0.8, 0, 0, 0.1], a=1.2, v=0.05, r=0)\n"
+                           "    movel(p[1.6, 0.2, 0.8, 0, 0, 0.1], t=3)\nend\n";
+  const auto refused = [&](const std::string& old, const std::string& now) {
+    std::string changed = text;
+    REQUIRE(changed.find(old) != std::string::npos);
+    changed.replace(changed.find(old), old.size(), now);
+    const auto read = urscript::read_back(machine, changed, "job.script");
+    REQUIRE_FALSE(read.ok());
+    UNSCOPED_INFO(to_string(read.diagnostics().front()));
+    return to_string(read.diagnostics().front());
+  };
+  CHECK(refused("a=1.4, v=1.05", "").find("job.script:5:5") != std::string::npos);
+  CHECK(refused("movej([0, -1.5, 1.5, 0, 0.7, 0]", "movej(p[1, 0, 1, 0, 0, 0]")
+            .find("which of the arm") != std::string::npos);
+  CHECK(refused("movel(p[1.5", "while True:").find("program flow") != std::string::npos);
+  CHECK(refused("set_tcp(", "textmsg(").find("NC347") != std::string::npos);
+  CHECK(refused("movel(p[1.5, 0.1, 0.8, 0, 0, 0]",
+                "movel(pose_trans(sp_part, p[1.5, 0.1, 0.8, 0, 0, 0])")
+            .find("NC348") != std::string::npos);
+  const auto read = urscript::read_back(machine, text, "job.script");
+  for (const auto& d : read.diagnostics()) UNSCOPED_INFO(to_string(d));
+  REQUIRE(read.ok());
+  const ReadBack& back = read.value();
+  REQUIRE(back.moves.size() == 4);
+  CHECK(back.part->isApprox(Pose::Identity()));
+  CHECK(back.moves[1].tool.translation() == Vec3(1500, 100, 800));
+  CHECK(back.moves[2].duration == Approx(2.0));
+  CHECK(back.moves[3].duration == Approx(3.0));
+}
+
 TEST_CASE("urscript: events, and those on the fly that stop the robot", "[machines][dialects]") {
   auto machine = arm();
   machine.process.events = {{"beam_on", "set_standard_digital_out(1, True)", true, 0.0, 0.0},
@@ -99,8 +137,6 @@ TEST_CASE("urscript: what could move differently than certified is refused",
       {"def smoothpost():", "thread smoothpost():"},
       {"\nend\n", "\n"},
       {"\nend\n", "\nend\nsmoothpost()\n"},
-      {"  movep", " movep"},
-      {"  movep", "    movep"},
       {"movep(", "movec("},
       {"pose_trans(sp_part,", "pose_trans(other,"},
       {"pose_trans(sp_part, p[0.1, 0, 0, 0, 0, 0])", "p[0.1, 0, 0, 0, 0, 0]"},

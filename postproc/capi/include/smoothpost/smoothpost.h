@@ -123,6 +123,8 @@ typedef struct smoothpost_options {
   const char* normal_tolerance; /* finish: deg, of the tool axis against the surface's normal */
   const char* direction; /* finish: alternate | same | helical, of the layers */
   const char* stock_out; /* finish: a path for the STL of the body to be printed */
+  const char* run_budget; /* nc: blocks that loops, calls and cycles may run beyond the text */
+  const char* call_depth; /* nc: calls within each other */
 } smoothpost_options;
 
 /* All members to "not given". `size` is sizeof(smoothpost_options) as the caller knows it. */
