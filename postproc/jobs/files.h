@@ -16,4 +16,7 @@ Result<std::string> read_file(const std::string& path, std::size_t limit = std::
 /// US131.
 Diagnostics write_file(const std::string& path, std::string_view bytes);
 
+/// Removes what a process that was killed inside write_file() has left in a folder.
+void remove_temporaries(const std::string& folder, long process);
+
 }  // namespace smoothpost

@@ -11,6 +11,7 @@
 #include "kernels/geometry/mesh_report.h"
 #include "kernels/geometry/weld.h"
 #include "machines/dialects/decimal.h"
+#include "postproc/jobs/batch.h"
 #include "postproc/jobs/files.h"
 #include "postproc/jobs/finish.h"
 #include "postproc/jobs/golden.h"
@@ -42,7 +43,15 @@ std::string decimal(double value, int digits) {
 /// One run of convert or check: reads the options, runs the pipeline, writes the files.
 class Run {
  public:
-  Run(const Options& options, const Progress& progress) : options_(options), progress_(progress) {}
+  Run(const Options& options, const Progress& progress) : options_(options) {
+    // Once the host has said no, it is no to the end, whoever asks.
+    progress_.report = [this, &progress](const char* stage, double share) {
+      cancelled_ = cancelled_ || !progress(stage, share);
+      return !cancelled_;
+    };
+  }
+  Run(const Run&) = delete;
+  Run& operator=(const Run&) = delete;
 
   JobResult convert_command() {
     if (!options_make_sense() || !load_output_machine() || !load_input()) return finish();
@@ -135,9 +144,11 @@ class Run {
     if (!made.ok()) return false;
     path = std::move(made.value());
     if (!options_.stock_out.empty()) {
-      const Diagnostics errors = write_file(options_.stock_out, stl_bytes(path.stock));
+      const std::string stock = stl_bytes(path.stock);
+      const Diagnostics errors = write_file(options_.stock_out, stock);
       add(errors);
       if (has_error(errors)) return false;
+      result_.written.push_back({options_.stock_out, sha256(stock)});
     }
     in.input.path = path.path;
     in.input.reference = "the walls of " + base_name(input_name_) + ", " +
@@ -153,6 +164,20 @@ class Run {
     return complete(in);
   }
 
+  void note(const std::vector<FileHash>& files) {
+    result_.read.insert(result_.read.end(), files.begin(), files.end());
+  }
+  // Reading tells them by notes, of which it keeps a hundred.
+  void note_subroutines(const Diagnostics& told) {
+    std::size_t files = 0;
+    for (const Diagnostic& d : told) {
+      if (d.code != "NC259") continue;
+      ++files;
+      const auto bytes = read_file(d.where.file);
+      note({{d.where.file, bytes.ok() ? sha256(bytes.value()) : "unknown"}});
+    }
+    if (files >= 100) note({{"more files of subroutines", "unknown"}});
+  }
   void add(Diagnostic d) { result_.diagnostics.push_back(std::move(d)); }
   void add(const Diagnostics& list) {
     result_.diagnostics.insert(result_.diagnostics.end(), list.begin(), list.end());
@@ -177,6 +202,7 @@ class Run {
     add(machine.diagnostics());
     if (!machine.ok()) return false;
     machine_ = std::move(machine.value());
+    note(machine_.files);
     context_.machine = machine_.definition.name;
     context_.dialect = machine_.definition.dialect.name;
     std::string with_overrides = machine_.text;
@@ -201,6 +227,7 @@ class Run {
         return false;
       }
       input_bytes_ = std::move(bytes.value());
+      note({{options_.input, sha256(input_bytes_)}});
     }
     if (!options_.output.empty() && options_.output != "-" && !options_.input_data) {
       std::error_code error;
@@ -300,6 +327,7 @@ class Run {
       unreadable_ = true;
       return false;
     }
+    note({{options_.against, sha256(bytes.value())}});
     in.against = read_cam_program(options_.against, std::move(bytes.value()));
     return in.against.has_value();
   }
@@ -326,6 +354,7 @@ class Run {
     add(read.diagnostics());
     if (!read.ok()) return {};
     context_.input_dialect = read.value().dialect;
+    note_subroutines(read.diagnostics());
     return std::move(read.value());
   }
 
@@ -362,12 +391,14 @@ class Run {
       auto machine = load_machine(options_.input_machine, options_, {});
       add(machine.diagnostics());
       if (!machine.ok()) return false;
+      note(machine.value().files);
       settings.machine = std::move(machine.value().definition);
     }
     if (!options_.process.empty()) {
       const auto bytes = read_file(options_.process, std::size_t{16} << 20);
       add(bytes.diagnostics());
       if (!bytes.ok()) return false;
+      note({{options_.process, sha256(bytes.value())}});
       auto process = parse_process_file(bytes.value(), options_.process);
       add(process.diagnostics());
       if (!process.ok()) return false;
@@ -445,6 +476,7 @@ class Run {
         return false;
       }
       bytes = std::move(read.value());
+      note({{options_.workpiece, sha256(bytes)}});
     }
     return read_mesh(bytes, part_name, part);
   }
@@ -556,6 +588,17 @@ class Run {
     result_.summary = text;
   }
 
+  /// A cancelled run has no program, also when what is left undone was not needed for one or force
+  /// was said.
+  void forget_all() {
+    Diagnostics told = std::move(result_.diagnostics);
+    result_ = JobResult{};
+    std::erase_if(told, [](const Diagnostic& d) { return d.code == "US190"; });
+    add(told);
+    add(usage_error("US190", "cancelled"));
+    verdict_.reset();
+  }
+
   /// Without a conversion there is still a report that says why.
   void report_failure() {
     Conversion none;
@@ -568,6 +611,7 @@ class Run {
 
   JobResult finish() {
     context_.version = kVersion;
+    if (cancelled_) forget_all();
     if (!verdict_) report_failure();
     result_.status = status_of(result_.diagnostics);
     if (unreadable_) result_.status = ExitStatus::unreadable;
@@ -581,12 +625,15 @@ class Run {
       if (path.empty() || path == "-" || bytes.empty()) return;
       const Diagnostics errors = write_file(path, bytes);
       add(errors);
-      if (has_error(errors)) result_.status = ExitStatus::usage;
+      if (has_error(errors))
+        result_.status = ExitStatus::usage;
+      else
+        result_.written.push_back({path, sha256(bytes)});
     };
     write(options_.json, result_.report);
     write(options_.report, result_.page);
-    if (!options_.plots.empty()) {
-      const Diagnostics errors = write_plots(options_.plots, result_.plots);
+    if (!options_.plots.empty() && options_.plots != "-") {
+      const Diagnostics errors = write_plots(options_.plots, result_.plots, result_.written);
       add(errors);
       if (has_error(errors)) result_.status = ExitStatus::usage;
     }
@@ -610,7 +657,8 @@ class Run {
   }
 
   const Options& options_;
-  const Progress& progress_;
+  Progress progress_;
+  bool cancelled_ = false;
   JobResult result_;
   LoadedMachine machine_;
   std::string input_name_;
@@ -630,11 +678,12 @@ JobResult dispatch(const Options& options, const Progress& progress) {
   if (options.command == "machines") return run_machines_command(options);
   if (options.command == "formats") return run_formats_command(options);
   if (options.command == "golden") return run_golden_command(options, progress);
+  if (options.command == "batch") return run_batch_command(options, progress);
   JobResult result;
   result.status = ExitStatus::usage;
-  result.diagnostics.push_back(
-      usage_error("US100", "unknown command \"" + options.command +
-                               "\": convert, check, finish, place, machines, formats or golden"));
+  result.diagnostics.push_back(usage_error(
+      "US100", "unknown command \"" + options.command +
+                   "\": convert, check, finish, place, batch, machines, formats or golden"));
   return result;
 }
 
