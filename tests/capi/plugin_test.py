@@ -26,7 +26,7 @@ def main():
     by_tool, by_host = given.work / "tool", given.work / "host"
     for folder in (by_tool, by_host):
         folder.mkdir(parents=True)
-    part = given.source / "examples/mill_ac/mill_ac.ngc"
+    part = given.source / "examples/benchmark/pole.csv"
 
     subprocess.run([given.tool, "convert", part, "-m", "table_table_bc", "--input-machine", "table_table_ac", "--tool",
                     "1=60", "-o", by_tool / "out.ngc", "--report", by_tool / "page.html", "--plots", by_tool,
