@@ -175,7 +175,7 @@ def main():
     total = [0, 0]
     complaints = []
     for page in given.page:
-        run, left, problems = run_page(page, given.source, given.tool.resolve(), given.work.resolve())
+        run, left, problems = run_page(page, given.source.resolve(), given.tool.resolve(), given.work.resolve())
         total = [total[0] + run, total[1] + left]
         complaints += problems
     print("\n".join(complaints))
