@@ -28,6 +28,23 @@ if(TARGET smoothpost_tool)
   file(RELATIVE_PATH bin_to_lib ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR})
   set_target_properties(smoothpost_tool PROPERTIES INSTALL_RPATH "$ORIGIN/${bin_to_lib}")
   install(TARGETS smoothpost_tool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+
+  # Manual page and completions come from the tool's own table of options.
+  set(documents "")
+  foreach(kind man bash zsh fish)
+    set(made ${PROJECT_BINARY_DIR}/documents/smoothpost.${kind})
+    add_custom_command(OUTPUT ${made}
+      COMMAND ${CMAKE_COMMAND} -E make_directory ${PROJECT_BINARY_DIR}/documents
+      COMMAND smoothpost_tool --generate ${kind} > ${made}
+      DEPENDS smoothpost_tool VERBATIM)
+    list(APPEND documents ${made})
+  endforeach()
+  add_custom_target(smoothpost_documents ALL DEPENDS ${documents})
+  set(made ${PROJECT_BINARY_DIR}/documents/smoothpost)
+  install(FILES ${made}.man DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 RENAME smoothpost.1)
+  install(FILES ${made}.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME smoothpost)
+  install(FILES ${made}.zsh DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions RENAME _smoothpost)
+  install(FILES ${made}.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
 endif()
 
 file(GLOB machine_files RELATIVE ${PROJECT_SOURCE_DIR}/machines CONFIGURE_DEPENDS

@@ -44,6 +44,7 @@ ProgramUnit* Executor::unit_of_file(const std::string& name, TextPlace place) {
          place);
     return nullptr;
   }
+  log_.adopt({Severity::note, "NC259", "read as a subroutine of the program", {file.path, 1, 1}});
   if (!spend(1 + file.text.size() / 256, place)) return nullptr;
   ParsedProgram parsed = parse(std::move(file.text), file.name, dialect_);
   for (const Diagnostic& d : parsed.diagnostics) {
@@ -51,6 +52,7 @@ ProgramUnit* Executor::unit_of_file(const std::string& name, TextPlace place) {
     stopped_ = stopped_ || d.severity == Severity::error;
   }
   auto unit = std::make_unique<ProgramUnit>();
+  unit->path = std::move(file.path);
   unit->owned = std::make_unique<Program>(std::move(parsed.program));
   unit->program = unit->owned.get();
   units_.push_back(std::move(unit));

@@ -83,7 +83,7 @@ Result<InterpretationSummary> Executor::run() {
   if (log_.has_error()) return Result<InterpretationSummary>::failure(log_.take());
   for (const auto& unit : units_)
     if (unit->owned)
-      summary_.files.push_back({unit->owned->file_name, std::move(unit->owned->text)});
+      summary_.files.push_back({unit->owned->file_name, unit->path, std::move(unit->owned->text)});
   return {std::move(summary_), log_.take()};
 }
 

@@ -51,6 +51,7 @@ struct InterpreterSettings {
 /// The text of a subroutine's file that the run has read.
 struct CalledFile {
   std::string name;  ///< without its folder
+  std::string path;  ///< with it
   std::string text;
 };
 

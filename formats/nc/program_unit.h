@@ -18,6 +18,7 @@ namespace smoothpost::nc {
 struct ProgramUnit {
   const Program* program = nullptr;
   std::unique_ptr<Program> owned;                  ///< of a file
+  std::string path;                                ///< of that file
   std::optional<FlowIndex> index;                  ///< made when the flow first asks for it
   std::unordered_map<std::uint32_t, long> counts;  ///< runs left of repeat loops, by statement
 };

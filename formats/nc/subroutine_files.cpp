@@ -72,6 +72,7 @@ SubroutineFile find_subroutine(const std::vector<std::string>& folders, std::str
       std::error_code failed;
       if (!fs::exists(fs::symlink_status(path, failed)) || failed) continue;
       out.name = file;
+      out.path = path.string();
       if (!lies_in(path, folder)) {
         out.problem = "a link leads out of its folder";
       } else if (!fs::is_regular_file(path, failed) || failed) {

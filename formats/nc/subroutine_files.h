@@ -12,6 +12,7 @@ namespace smoothpost::nc {
 /// A file that was found for a subroutine, or why none was read.
 struct SubroutineFile {
   std::string name;  ///< without its folder; empty: none was found
+  std::string path;  ///< with it
   std::string text;
   std::string problem;  ///< a file was found and may not be read
   bool found() const { return !name.empty(); }

@@ -8,6 +8,7 @@
 #include <IpSolveStatistics.hpp>
 #include <IpTNLP.hpp>
 #include <algorithm>
+#include <mutex>
 
 namespace smoothpost {
 namespace {
@@ -209,6 +210,9 @@ QpSolution run(const QuadraticProgram& qp, const QpSettings& settings) {
   Ipopt::ApplicationReturnStatus status = Ipopt::Internal_Error;
   int iterations = 0;
   std::string word;
+  // Ipopt 3.11 and MUMPS keep state of the process: one solve at a time, whichever thread asks.
+  static std::mutex one_at_a_time;
+  const std::lock_guard<std::mutex> alone(one_at_a_time);
   try {
     Ipopt::SmartPtr<Ipopt::IpoptApplication> application = new Ipopt::IpoptApplication(false);
     set_options(*application->Options(), settings);

@@ -38,6 +38,24 @@ smoothpost_options complete(const smoothpost_options& given) {
   return options;
 }
 
+// Whether a caller built against a newer header asks for what this library does not know.
+bool asks_for_unknown(const smoothpost_options& given) {
+  const auto* bytes = reinterpret_cast<const unsigned char*>(&given);
+  return given.size > sizeof given && std::any_of(bytes + sizeof given, bytes + given.size,
+                                                  [](unsigned char b) { return b != 0; });
+}
+
+smoothpost::JobResult unknown_options() {
+  smoothpost::JobResult result;
+  result.status = smoothpost::ExitStatus::usage;
+  smoothpost::Diagnostic d;
+  d.code = "US186";
+  d.text = std::string("the host sets an option that smoothpost ") + smoothpost::kVersion +
+           " does not know: install the library of the host's header, or leave the option out";
+  result.diagnostics.push_back(std::move(d));
+  return result;
+}
+
 Options options_of(const smoothpost_options& o) {
   Options out;
   out.command = text(o.command);
@@ -95,6 +113,10 @@ Options options_of(const smoothpost_options& o) {
   out.normal_tolerance = text(o.normal_tolerance);
   out.direction = text(o.direction);
   out.stock_out = text(o.stock_out);
+  out.jobs = text(o.jobs);
+  out.only = text(o.only);
+  out.worker = text(o.worker);
+  out.list = o.list != 0;
   out.set = list(o.set, o.set_count);
   out.no_collision_check = o.no_collision_check != 0;
   out.timings = o.timings != 0;
@@ -128,12 +150,13 @@ smoothpost_status smoothpost_run(const smoothpost_options* options, smoothpost_r
         return given.progress(given.progress_user, stage, share) == 0;
       };
     auto out = std::make_unique<smoothpost_result>();
-    out->job = smoothpost::run_job(options_of(given), progress);
+    out->job = asks_for_unknown(*options) ? unknown_options()
+                                          : smoothpost::run_job(options_of(given), progress);
     for (const auto& d : out->job.diagnostics) out->formatted.push_back(smoothpost::to_string(d));
     out->diagnostics_json = smoothpost::diagnostics_json(out->job.diagnostics);
     *result = out.release();
     return smoothpost_result_status(*result);
-  } catch (const std::exception&) {
+  } catch (...) {  // memory; whatever a host's callback throws
     return SMOOTHPOST_INTERNAL;
   }
 }
@@ -158,6 +181,20 @@ const char* smoothpost_result_line_map(const smoothpost_result* result, size_t* 
 }
 const char* smoothpost_result_trajectory(const smoothpost_result* result, size_t* size) {
   return bytes(result->job.trajectory, size);
+}
+const char* smoothpost_result_page(const smoothpost_result* result, size_t* size) {
+  return bytes(result->job.page, size);
+}
+size_t smoothpost_result_plot_count(const smoothpost_result* result) {
+  return result->job.plots.size();
+}
+const char* smoothpost_result_plot_name(const smoothpost_result* result, size_t index) {
+  const auto& plots = result->job.plots;
+  return index < plots.size() ? plots[index].name.c_str() : nullptr;
+}
+const char* smoothpost_result_plot(const smoothpost_result* result, size_t index, size_t* size) {
+  const auto& plots = result->job.plots;
+  return index < plots.size() ? bytes(plots[index].svg, size) : nullptr;
 }
 const char* smoothpost_result_text(const smoothpost_result* result, size_t* size) {
   return bytes(result->job.text, size);

@@ -1,50 +1,30 @@
-#include <unistd.h>
-
 #include <csignal>
-#include <cstdio>
 #include <iostream>
 #include <iterator>
 #include <memory>
 #include <string>
 
 #include "postproc/cli/options.h"
+#include "postproc/cli/progress_view.h"
 
 namespace {
 
 using smoothpost::cli::CommandLine;
 
 volatile std::sig_atomic_t interrupted = 0;
-void on_interrupt(int) { interrupted = 1; }
 
-enum class Bar { none, terminal, filter };
-
-struct ProgressView {
-  Bar bar = Bar::none;
-  int last = -1;
-};
-
-// Stages of a run by weight, for one number from 0 to 100.
-int percent_of(const std::string& stage, double share) {
-  const double base = stage == "verify" ? 50.0 : 0.0;
-  return static_cast<int>(base + 50.0 * share);
+/// The first time the run is asked to stop where it can; the second time it ends at once.
+void on_interrupt(int number) {
+  if (interrupted) {
+    std::signal(number, SIG_DFL);
+    std::raise(number);
+  }
+  interrupted = 1;
 }
 
 int on_progress(void* user, const char* stage, double share) {
-  auto& view = *static_cast<ProgressView*>(user);
-  const int percent = percent_of(stage, share);
-  if (percent != view.last) {
-    view.last = percent;
-    if (view.bar == Bar::filter) std::fprintf(stderr, "FILTER_PROGRESS=%d\n", percent);
-    if (view.bar == Bar::terminal) std::fprintf(stderr, "\r%3d %% %-12s", percent, stage);
-    std::fflush(stderr);
-  }
-  return interrupted ? 1 : 0;
-}
-
-Bar bar_of(const std::string& option) {
-  if (option == "bar") return Bar::terminal;
-  if (option == "filter") return Bar::filter;
-  return option == "auto" && isatty(STDERR_FILENO) ? Bar::terminal : Bar::none;
+  static_cast<smoothpost::cli::ProgressView*>(user)->show(stage, share);
+  return interrupted;
 }
 
 const char* or_null(const std::string& text) { return text.empty() ? nullptr : text.c_str(); }
@@ -123,6 +103,10 @@ struct CallOptions {
     c.normal_tolerance = or_null(l.normal_tolerance);
     c.direction = or_null(l.direction);
     c.stock_out = or_null(l.stock_out);
+    c.jobs = or_null(l.jobs);
+    c.only = or_null(l.only);
+    c.worker = or_null(l.worker);
+    c.list = l.list;
     c.set = set.data();
     c.set_count = set.size();
     c.no_collision_check = l.no_collision_check;
@@ -177,16 +161,15 @@ int finish(const CommandLine& line, const smoothpost_result* result) {
 int main(int argc, char** argv) {
   const auto parsed = smoothpost::cli::parse_command_line(argc, argv);
   if (parsed.leave) return parsed.status;
-  std::signal(SIGINT, on_interrupt);
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) std::signal(number, on_interrupt);
   std::signal(SIGPIPE, SIG_IGN);
   CallOptions options(parsed.line);
-  ProgressView view;
-  view.bar = bar_of(parsed.line.progress);
+  smoothpost::cli::ProgressView view(smoothpost::cli::bar_of(parsed.line.progress));
   options.c.progress = on_progress;
   options.c.progress_user = &view;
   smoothpost_result* raw = nullptr;
   const int status = smoothpost_run(&options.c, &raw);
-  if (view.bar == Bar::terminal && view.last >= 0) std::fprintf(stderr, "\r%*s\r", 24, "");
+  view.clear();
   if (!raw) {
     std::cerr << "error: internal error: out of memory ["
               << "IN102"

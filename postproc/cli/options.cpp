@@ -6,27 +6,67 @@
 #include <memory>
 
 #include "kernels/core/nearest_name.h"
+#include "postproc/cli/documents.h"
 
 namespace smoothpost::cli {
 
 namespace {
 
-/// Help that opens with what the command does and an example, the footer of its App.
-class ExampleFirst : public CLI::Formatter {
- public:
-  std::string make_description(const CLI::App* app) const override {
-    return CLI::Formatter::make_description(app) + "\n" + app->get_footer() + "\n";
-  }
-  std::string make_footer(const CLI::App*) const override { return {}; }
-};
-
-constexpr const char* kExample =
+// Each command shows its own before its options.
+constexpr const char* kConvertExample =
     "Example: a program posted for an A/C table machine, for a B/C table machine:\n"
     "  smoothpost convert part.ngc --input-machine table_table_ac -m table_table_bc --tool 1=60 "
-    "-o out.ngc --json out.json\n"
+    "-o out.ngc --json out.json --report out.html\n"
     "A 3D laser program with its part, placed on the machine, certified with its gap:\n"
     "  smoothpost convert sheet.ngc --input-machine laser_5p1 -m laser_5p1 -w sheet.stl "
     "--work-offset G54=700,600,1000 -o out.ngc\n";
+constexpr const char* kCheckExample =
+    "Example: does out.ngc follow the CAM program, and keep the machine's limits?\n"
+    "  smoothpost check out.ngc -m table_table_bc --against part.ngc --input-machine "
+    "table_table_ac --tool 1=60\n";
+constexpr const char* kFinishExample =
+    "Example: the walls of a part that stands 35 mm above the bed, layers 1 mm apart:\n"
+    "  smoothpost finish part.stl -m finish_2p2r_1p1r --work-offset G54=0,0,35 --stock-out "
+    "stock.stl -o out.ngc\n";
+constexpr const char* kPlaceExample =
+    "Example: where to put the part, so that the robot reaches the whole path:\n"
+    "  smoothpost place part.ngc --input-machine table_table_ac -m robot_6r --tool 1=60\n";
+constexpr const char* kBatchExample =
+    "Example: every job of a file that is not finished yet, four at a time:\n"
+    "  smoothpost batch jobs.toml --jobs 4\n"
+    "jobs.toml (docs/how_to/batch.md):\n"
+    "  [defaults]\n"
+    "  machine = \"table_table_bc\"\n"
+    "  input-machine = \"table_table_ac\"\n"
+    "  tool = [\"1=60\"]\n"
+    "  [[job]]\n"
+    "  input = \"part.ngc\"\n";
+constexpr const char* kMachinesExample =
+    "Examples: what a machine is, and is its file right:\n"
+    "  smoothpost machines show table_table_bc\n"
+    "  smoothpost machines validate machine.toml\n"
+    "A slow program that proves what the machine does:\n"
+    "  smoothpost machines test-program table_table_bc --tool 1=60 -o test.ngc\n"
+    "A machine file from a robot description, and one from LinuxCNC's configuration:\n"
+    "  smoothpost machines import robot.urdf joint_limits.yaml -o machine.toml\n"
+    "  smoothpost machines import mill.ini A=table C=table -o machine.toml\n"
+    "Rotary centres from readings of a sphere, into a new file:\n"
+    "  smoothpost machines fit measured.csv fit=A.origin,C.origin -m machine.toml -o "
+    "fitted.toml\n";
+constexpr const char* kFormatsExample = "Example:\n  smoothpost formats\n";
+constexpr const char* kGoldenExample =
+    "Example: does this version post the shop's own programs as it did?\n"
+    "  smoothpost golden run shop_cases\n";
+
+/// Help that begins with an example.
+class ExampleFirst : public CLI::Formatter {
+ public:
+  std::string make_description(const CLI::App* app) const override {
+    const std::string example = app->get_footer();
+    return CLI::Formatter::make_description(app) + (example.empty() ? "" : "\n" + example + "\n");
+  }
+  std::string make_footer(const CLI::App*) const override { return {}; }
+};
 
 void add_machine_options(CLI::App* app, CommandLine& l) {
   app->add_option("-m,--machine", l.machine, "the machine: a name or a machine.toml");
@@ -36,14 +76,18 @@ void add_machine_options(CLI::App* app, CommandLine& l) {
       ->allow_extra_args(false);
 }
 
+void add_run_options(CLI::App* c, CommandLine& l) {
+  c->add_option("--diagnostics", l.diagnostics, "text | json")
+      ->check(CLI::IsMember({"text", "json"}));
+  c->add_option("--progress", l.progress, "auto | bar | filter | none")
+      ->check(CLI::IsMember({"auto", "bar", "filter", "none"}));
+}
+
 void add_output_options(CLI::App* app, CommandLine& l) {
   app->add_option("--json", l.json, "write the JSON report to FILE");
   app->add_option("--report", l.report, "write the report page, one HTML file, to FILE");
   app->add_option("--plots", l.plots, "write the plots of the report page as SVG files to DIR");
-  app->add_option("--diagnostics", l.diagnostics, "text | json")
-      ->check(CLI::IsMember({"text", "json"}));
-  app->add_option("--progress", l.progress, "auto | bar | filter | none")
-      ->check(CLI::IsMember({"auto", "bar", "filter", "none"}));
+  add_run_options(app, l);
   app->add_flag("--timings", l.timings, "put the seconds of each stage into the report");
 }
 
@@ -110,7 +154,7 @@ void add_search_options(CLI::App* app, CommandLine& l) {
 
 void add_convert(CLI::App& app, CommandLine& l) {
   auto* c = app.add_subcommand("convert", "a CAM program to a certified machine program");
-  c->footer(kExample);
+  c->footer(kConvertExample);
   c->add_option("input", l.input, "NC program, CL data or CSV; - for standard input")->required();
   add_machine_options(c, l);
   c->add_option("-o,--output", l.output, "the program; - for standard output");
@@ -136,10 +180,7 @@ void add_convert(CLI::App& app, CommandLine& l) {
 
 void add_finish(CLI::App& app, CommandLine& l) {
   auto* c = app.add_subcommand("finish", "the mesh of a printed part to a finishing program");
-  c->footer(
-      "Example: the walls of a part that stands 35 mm above the bed, layers 1 mm apart:\n"
-      "  smoothpost finish part.stl -m finish_2p2r_1p1r --work-offset G54=0,0,35 --stock-out "
-      "stock.stl -o out.ngc\n");
+  c->footer(kFinishExample);
   c->add_option("input", l.input, "the part: an STL, walls to be finished; - for standard input")
       ->required();
   add_machine_options(c, l);
@@ -181,9 +222,7 @@ void add_finish(CLI::App& app, CommandLine& l) {
 
 void add_place(CLI::App& app, CommandLine& l) {
   auto* c = app.add_subcommand("place", "where to put the part: prints a --work-offset");
-  c->footer(
-      "Example: where on the robot's table a contour can be cut, and with how much margin:\n"
-      "  smoothpost place contour.csv -m robot_6r --box 0,0,0,400,400,200\n");
+  c->footer(kPlaceExample);
   c->add_option("input", l.input, "NC program, CL data or CSV; - for standard input")->required();
   add_machine_options(c, l);
   add_part_options(c, l);
@@ -198,10 +237,7 @@ void add_place(CLI::App& app, CommandLine& l) {
 
 void add_check(CLI::App& app, CommandLine& l) {
   auto* c = app.add_subcommand("check", "certify an existing machine program");
-  c->footer(
-      "Example: limits and clearance of a program, and with --against its shape too:\n"
-      "  smoothpost check out.ngc -m table_table_bc --tool 1=60 --against part.ngc "
-      "--input-machine table_table_ac --json check.json\n");
+  c->footer(kCheckExample);
   c->add_option("program", l.input, "the program; - for standard input")->required();
   add_machine_options(c, l);
   c->add_option("--dialect", l.dialect, "the program's dialect instead of the machine's");
@@ -213,15 +249,28 @@ void add_check(CLI::App& app, CommandLine& l) {
   add_output_options(c, l);
 }
 
-CLI::App* add_words(CLI::App& app, CommandLine& l, const char* name, const char* help) {
+void add_batch(CLI::App& app, CommandLine& l) {
+  auto* c =
+      app.add_subcommand("batch", "many conversions, each in a process of its own; restartable");
+  c->footer(kBatchExample);
+  c->add_option("jobs_file", l.arguments, "the job file, TOML")->required()->expected(1);
+  c->add_option("--jobs", l.jobs, "how many run at a time; default: one for each processor");
+  c->add_option("--only", l.only, "run this one job here and now, with its exit status");
+  c->add_flag("--list", l.list, "name the jobs, run none");
+  c->add_option("--worker", l.worker, "the smoothpost program that runs a job; default: this one");
+  add_run_options(c, l);
+}
+
+CLI::App* add_words(CLI::App& app, CommandLine& l, const char* name, const char* help,
+                    const char* example) {
   auto* c = app.add_subcommand(name, help);
+  c->footer(example);
   c->add_option("words", l.arguments, "what to do");
   c->add_option("--machine-path", l.machine_path, "folders of machines, separated by ':'");
   c->add_option("--set", l.set, "section.key=value of the machine file, repeatable")
       ->take_all()
       ->allow_extra_args(false);
-  c->add_option("--diagnostics", l.diagnostics, "text | json")
-      ->check(CLI::IsMember({"text", "json"}));
+  add_run_options(c, l);
   return c;
 }
 
@@ -277,27 +326,28 @@ Parsed parse_command_line(int argc, char** argv) {
   Parsed parsed;
   CommandLine& l = parsed.line;
   CLI::App app("smoothpost: CAM programs to certified machine programs", "smoothpost");
-  app.footer(kExample);
   app.formatter(std::make_shared<ExampleFirst>());
+  app.footer(kConvertExample);
   app.set_version_flag("--version", std::string("smoothpost ") + smoothpost_version());
   app.require_subcommand(1);
+  app.add_option_function<std::string>(
+         "--generate",
+         [&app](const std::string& kind) {
+           std::cout << document(app, kind);
+           throw CLI::Success();
+         },
+         "print man | bash | zsh | fish: the manual page, or a shell's completion")
+      ->check(CLI::IsMember({"man", "bash", "zsh", "fish"}))
+      ->trigger_on_parse();
   add_convert(app, l);
   add_check(app, l);
   add_finish(app, l);
   add_place(app, l);
+  add_batch(app, l);
   auto* machines = add_words(
       app, l, "machines",
-      "list | show NAME | validate FILE | test-program NAME | import FILE | fit TABLE.csv");
-  machines->footer(
-      "Examples: a machine file from a robot description, and one from LinuxCNC's configuration:\n"
-      "  smoothpost machines import robot.urdf joint_limits.yaml -o machine.toml\n"
-      "  smoothpost machines import mill.ini A=table C=table -o machine.toml\n"
-      "Rotary centres from readings of a sphere, into a new file:\n"
-      "  smoothpost machines fit measured.csv fit=A.origin,C.origin -m machine.toml -o "
-      "fitted.toml\n"
-      "Is a file right, and does it say what the machine does:\n"
-      "  smoothpost machines validate machine.toml\n"
-      "  smoothpost machines test-program table_table_bc --tool 1=60 -o test.ngc\n");
+      "list | show NAME | validate FILE | test-program NAME | import FILE | fit TABLE.csv",
+      kMachinesExample);
   machines->add_option("-o,--output", l.output,
                        "test-program, import, fit: the file to write; - for standard output");
   machines->add_option("-m,--machine", l.machine, "fit: the machine, a name or a machine.toml");
@@ -305,12 +355,9 @@ Parsed parse_command_line(int argc, char** argv) {
   machines
       ->add_option("--tool", l.tool, "test-program, fit: N=length in mm of the tool in the holder")
       ->allow_extra_args(false);
-  add_words(app, l, "formats", "input formats and output dialects")
-      ->footer("Example:\n  smoothpost formats\n");
-  add_words(app, l, "golden", "run DIR | update DIR: sample programs as regression cases")
-      ->footer(
-          "Example: all folders with a case.toml below samples/:\n  smoothpost golden run "
-          "samples\n");
+  add_words(app, l, "formats", "input formats and output dialects", kFormatsExample);
+  add_words(app, l, "golden", "run DIR | update DIR: sample programs as regression cases",
+            kGoldenExample);
   std::vector<std::string> words(argv + 1, argv + argc);
   if (!words.empty() && words[0] == "help") {  // help convert: convert --help
     words.erase(words.begin());

@@ -92,6 +92,22 @@ Diagnostics check_target(const std::string& path) {
   return {};
 }
 
+namespace {
+
+std::string temporary_name(const std::string& target, long process, int attempt) {
+  return target + ".new" + std::to_string(process) + "-" + std::to_string(attempt);
+}
+
+}  // namespace
+
+void remove_temporaries(const std::string& folder, long process) {
+  namespace fs = std::filesystem;
+  const std::string ending = temporary_name("", process, 0);
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder.empty() ? "." : folder, error))
+    if (entry.path().filename().string().ends_with(ending)) fs::remove(entry.path(), error);
+}
+
 Diagnostics write_file(const std::string& path, std::string_view bytes) {
   namespace fs = std::filesystem;
   // Links are followed, also one whose file is not there yet.
@@ -114,8 +130,7 @@ Diagnostics write_file(const std::string& path, std::string_view bytes) {
   std::string temporary;
   int raw = -1;
   for (int attempt = 0; attempt < 100 && raw < 0; ++attempt) {
-    temporary =
-        target.string() + ".new" + std::to_string(::getpid()) + "-" + std::to_string(attempt);
+    temporary = temporary_name(target.string(), ::getpid(), attempt);
     raw = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (raw < 0 && errno != EEXIST) break;
   }

@@ -20,4 +20,7 @@ Diagnostics check_target(const std::string& path);
 /// US131.
 Diagnostics write_file(const std::string& path, std::string_view bytes);
 
+/// Removes what a process that was killed inside write_file() has left in a folder.
+void remove_temporaries(const std::string& folder, long process);
+
 }  // namespace smoothpost

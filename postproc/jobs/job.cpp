@@ -11,6 +11,7 @@
 #include "kernels/geometry/mesh_report.h"
 #include "kernels/geometry/weld.h"
 #include "machines/dialects/decimal.h"
+#include "postproc/jobs/batch.h"
 #include "postproc/jobs/files.h"
 #include "postproc/jobs/finish.h"
 #include "postproc/jobs/golden.h"
@@ -43,6 +44,7 @@ std::string decimal(double value, int digits) {
 class Run {
  public:
   Run(const Options& options, const Progress& progress) : options_(options) {
+    // Once the host has said no, it is no to the end, whoever asks.
     progress_.report = [this, &progress](const char* stage, double share) {
       cancelled_ = cancelled_ || !progress(stage, share);
       return !cancelled_;
@@ -142,9 +144,11 @@ class Run {
     if (!made.ok()) return false;
     path = std::move(made.value());
     if (!options_.stock_out.empty()) {
-      const Diagnostics errors = write_file(options_.stock_out, stl_bytes(path.stock));
+      const std::string stock = stl_bytes(path.stock);
+      const Diagnostics errors = write_file(options_.stock_out, stock);
       add(errors);
       if (has_error(errors)) return false;
+      result_.written.push_back({options_.stock_out, sha256(stock)});
     }
     in.input.path = path.path;
     in.input.reference = "the walls of " + base_name(input_name_) + ", " +
@@ -160,6 +164,9 @@ class Run {
     return complete(in);
   }
 
+  void note(const std::vector<FileHash>& files) {
+    result_.read.insert(result_.read.end(), files.begin(), files.end());
+  }
   void add(Diagnostic d) { result_.diagnostics.push_back(std::move(d)); }
   void add(const Diagnostics& list) {
     result_.diagnostics.insert(result_.diagnostics.end(), list.begin(), list.end());
@@ -191,6 +198,7 @@ class Run {
       add(no_dialect(machine_.definition.dialect.name));
       return false;
     }
+    note(machine_.files);
     context_.machine = machine_.definition.name;
     context_.dialect = machine_.definition.dialect.name;
     std::string with_overrides = machine_.text;
@@ -215,6 +223,7 @@ class Run {
         return false;
       }
       input_bytes_ = std::move(bytes.value());
+      note({{options_.input, sha256(input_bytes_)}});
     }
     if (!options_.output.empty() && options_.output != "-" && !options_.input_data) {
       std::error_code error;
@@ -314,7 +323,9 @@ class Run {
       unreadable_ = true;
       return false;
     }
-    context_.input_files.push_back({base_name(options_.against), sha256(bytes.value())});
+    context_.input_files.push_back(
+        {base_name(options_.against), sha256(bytes.value()), options_.against});
+    note({{options_.against, sha256(bytes.value())}});
     in.against = read_cam_program(options_.against, std::move(bytes.value()));
     return in.against.has_value();
   }
@@ -386,12 +397,14 @@ class Run {
       auto machine = load_machine(options_.input_machine, options_, {});
       add(machine.diagnostics());
       if (!machine.ok()) return false;
+      note(machine.value().files);
       settings.machine = std::move(machine.value().definition);
     }
     if (!options_.process.empty()) {
       const auto bytes = read_file(options_.process, std::size_t{16} << 20);
       add(bytes.diagnostics());
       if (!bytes.ok()) return false;
+      note({{options_.process, sha256(bytes.value())}});
       auto process = parse_process_file(bytes.value(), options_.process);
       add(process.diagnostics());
       if (!process.ok()) return false;
@@ -469,6 +482,7 @@ class Run {
         return false;
       }
       bytes = std::move(read.value());
+      note({{options_.workpiece, sha256(bytes)}});
     }
     return read_mesh(bytes, part_name, part);
   }
@@ -580,6 +594,17 @@ class Run {
     result_.summary = text;
   }
 
+  /// A cancelled run has no program, also when what is left undone was not needed for one or force
+  /// was said.
+  void forget_all() {
+    Diagnostics told = std::move(result_.diagnostics);
+    result_ = JobResult{};
+    std::erase_if(told, [](const Diagnostic& d) { return d.code == "US190"; });
+    add(told);
+    add(usage_error("US190", "cancelled"));
+    verdict_.reset();
+  }
+
   /// Without a conversion there is still a report that says why.
   void report_failure() {
     Conversion none;
@@ -592,11 +617,7 @@ class Run {
 
   JobResult finish() {
     context_.version = kVersion;
-    const bool good = verdict_ && *verdict_ != Verdict::refused;
-    const auto told = [](const Diagnostic& d) { return d.code == "US190"; };
-    const auto& list = result_.diagnostics;
-    if (cancelled_ && !good && std::none_of(list.begin(), list.end(), told))
-      add(usage_error("US190", "cancelled"));
+    if (cancelled_) forget_all();
     if (!verdict_) report_failure();
     result_.status = status_of(result_.diagnostics);
     if (unreadable_) result_.status = ExitStatus::unreadable;
@@ -611,13 +632,17 @@ class Run {
       if (!check_target(path).empty()) return false;  // told at the start
       const Diagnostics errors = write_file(path, bytes);
       add(errors);
-      if (has_error(errors)) result_.status = ExitStatus::usage;
-      return !has_error(errors);
+      if (has_error(errors)) {
+        result_.status = ExitStatus::usage;
+        return false;
+      }
+      result_.written.push_back({path, sha256(bytes)});
+      return true;
     };
     write(options_.json, result_.report);
     write(options_.report, result_.page);
-    if (!options_.plots.empty()) {
-      const Diagnostics errors = write_plots(options_.plots, result_.plots);
+    if (!options_.plots.empty() && options_.plots != "-") {
+      const Diagnostics errors = write_plots(options_.plots, result_.plots, result_.written);
       add(errors);
       if (has_error(errors)) result_.status = ExitStatus::usage;
     }
@@ -662,11 +687,12 @@ JobResult dispatch(const Options& options, const Progress& progress) {
   if (options.command == "machines") return run_machines_command(options);
   if (options.command == "formats") return run_formats_command(options);
   if (options.command == "golden") return run_golden_command(options, progress);
+  if (options.command == "batch") return run_batch_command(options, progress);
   JobResult result;
   result.status = ExitStatus::usage;
-  result.diagnostics.push_back(
-      usage_error("US100", "unknown command \"" + options.command +
-                               "\": convert, check, finish, place, machines, formats or golden"));
+  result.diagnostics.push_back(usage_error(
+      "US100", "unknown command \"" + options.command +
+                   "\": convert, check, finish, place, batch, machines, formats or golden"));
   return result;
 }
 

@@ -5,6 +5,7 @@
 
 #include "kernels/core/diagnostic.h"
 #include "kernels/core/progress.h"
+#include "postproc/pipeline/hash.h"
 #include "postproc/pipeline/options.h"
 #include "postproc/report/report_plots.h"
 
@@ -18,16 +19,18 @@ enum class ExitStatus { certified = 0, internal = 1, usage = 2, refused = 3, unr
 struct JobResult {
   ExitStatus status = ExitStatus::internal;
   std::string verdict;
-  std::string program;       ///< empty unless certified or forced
-  std::string program_path;  ///< where it was written; empty: nowhere
-  std::string report;        ///< JSON, for convert, check and place
-  std::string page;          ///< HTML, likewise, when options.report or options.plots
+  std::string program;           ///< empty unless certified or forced
+  std::string program_path;      ///< where it was written; empty: nowhere
+  std::string report;            ///< JSON, for convert, check and place
+  std::string page;              ///< HTML, likewise, when options.report or options.plots
   std::vector<NamedPlot> plots;  ///< of the page
-  std::string line_map;      ///< JSON, for convert
-  std::string trajectory;    ///< CSV, when options.trajectory
-  std::string text;          ///< for people: place, machines, formats, golden
-  std::string summary;       ///< one line: verdict, checks, time
+  std::string line_map;          ///< JSON, for convert
+  std::string trajectory;        ///< CSV, when options.trajectory
+  std::string text;              ///< for people: place, machines, formats, golden, batch
+  std::string summary;           ///< one line: verdict, checks, time
   Diagnostics diagnostics;
+  std::vector<FileHash> read;     ///< every file that the run has read, in order
+  std::vector<FileHash> written;  ///< and written
 };
 
 inline constexpr const char* kVersion = "0.1.0";

@@ -87,8 +87,8 @@ Diagnostic wrong(const TomlEntry& entry, const std::string& what) {
 
 }  // namespace
 
-Result<Options> options_from_toml(const TomlTable& table) {
-  Options options;
+Result<Options> options_from_toml(const TomlTable& table, Options start) {
+  Options options = std::move(start);
   Diagnostics errors;
   for (const auto& entry : table.entries()) {
     std::string key = entry.key;
@@ -104,6 +104,7 @@ Result<Options> options_from_toml(const TomlTable& table) {
           value.kind == TomlKind::array &&
           std::all_of(value.items.begin(), value.items.end(),
                       [](const TomlValue& item) { return item.kind == TomlKind::string; });
+      (options.*(list->second)).clear();
       if (value.kind == TomlKind::string)
         (options.*(list->second)).push_back(value.string);
       else if (strings)
@@ -121,6 +122,26 @@ Result<Options> options_from_toml(const TomlTable& table) {
   }
   if (!errors.empty()) return Result<Options>::failure(std::move(errors));
   return options;
+}
+
+std::string options_text(const Options& options) {
+  std::string text;
+  const auto add = [&text](const std::string& name, const std::string& value) {
+    text += name + "=" + std::to_string(value.size()) + ":" + value + "\n";
+  };
+  for (const auto& [name, member] : text_options())
+    if (!(options.*member).empty()) add(name, options.*member);
+  for (const auto& [name, member] : list_options())
+    for (const auto& item : options.*member) add(name, item);
+  for (const auto& [name, member] : switch_options())
+    if (options.*member) add(name, "true");
+  return text;
+}
+
+void for_each_text(Options& options, const std::function<void(std::string&)>& change) {
+  for (const auto& [name, member] : text_options()) change(options.*member);
+  for (const auto& [name, member] : list_options())
+    for (auto& item : options.*member) change(item);
 }
 
 }  // namespace smoothpost

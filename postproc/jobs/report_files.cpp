@@ -24,7 +24,8 @@ ReportPage page_of(const Conversion& conversion, const ReportContext& context,
   return report_page(in);
 }
 
-Diagnostics write_plots(const std::string& folder, const std::vector<NamedPlot>& plots) {
+Diagnostics write_plots(const std::string& folder, const std::vector<NamedPlot>& plots,
+                        std::vector<FileHash>& written) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error)
@@ -32,7 +33,9 @@ Diagnostics write_plots(const std::string& folder, const std::vector<NamedPlot>&
   Diagnostics problems;
   for (const NamedPlot& plot : plots) {
     const auto path = std::filesystem::path(folder) / (plot.name + ".svg");
-    for (auto& d : write_file(path.string(), plot.svg)) problems.push_back(std::move(d));
+    auto failed = write_file(path.string(), plot.svg);
+    if (failed.empty()) written.push_back({path.string(), sha256(plot.svg)});
+    for (auto& d : failed) problems.push_back(std::move(d));
   }
   return problems;
 }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "kernels/core/diagnostic.h"
+#include "postproc/pipeline/hash.h"
 #include "postproc/report/report_page.h"
 
 // The report page of a run and its plots as files.
@@ -26,7 +27,8 @@ ReportPage page_of(const Conversion& conversion, const ReportContext& context,
                    std::string_view report);
 
 /// Writes every plot as <name>.svg into a folder, which is made when it does not exist. Fails with
-/// US131.
-Diagnostics write_plots(const std::string& folder, const std::vector<NamedPlot>& plots);
+/// US131. `written` gets what was written.
+Diagnostics write_plots(const std::string& folder, const std::vector<NamedPlot>& plots,
+                        std::vector<FileHash>& written);
 
 }  // namespace smoothpost

@@ -35,11 +35,12 @@ std::vector<std::string> split(std::string_view text, char separator) {
 }
 
 // Meshes of bodies: read, scaled and put into M.
-Diagnostics load_body_meshes(MachineDefinition& machine) {
+Diagnostics load_body_meshes(MachineDefinition& machine, std::vector<FileHash>& files) {
   for (Body& body : machine.bodies) {
     if (body.shape != BodyShape::mesh || body.mesh) continue;
     const auto bytes = read_file(body.mesh_file);
     if (!bytes.ok()) return bytes.diagnostics();
+    files.push_back({body.mesh_file, sha256(bytes.value())});
     StlSettings settings;
     settings.scale = body.mesh_scale;
     const auto stl = read_stl(bytes.value(), body.mesh_file, settings);
@@ -128,24 +129,24 @@ std::vector<std::string> machine_folders(const Options& options) {
   return folders;
 }
 
+std::string machine_file_of(const std::string& name_or_file, const Options& options) {
+  std::error_code error;
+  if (fs::is_regular_file(fs::path(name_or_file) / "machine.toml", error))
+    return (fs::path(name_or_file) / "machine.toml").string();
+  if (name_or_file.find('/') != std::string::npos || name_or_file.ends_with(".toml"))
+    return name_or_file;
+  for (const auto& folder : machine_folders(options)) {
+    const fs::path candidate = fs::path(folder) / name_or_file / "machine.toml";
+    if (fs::exists(candidate, error)) return candidate.string();
+  }
+  return {};
+}
+
 Result<LoadedMachine> load_machine(const std::string& name_or_file, const Options& options,
                                    const std::vector<MachineOverride>& overrides) {
-  std::string path;
-  std::error_code error;
-  if (fs::is_regular_file(fs::path(name_or_file) / "machine.toml", error)) {
-    path = (fs::path(name_or_file) / "machine.toml").string();
-  } else if (name_or_file.find('/') != std::string::npos || name_or_file.ends_with(".toml")) {
-    path = name_or_file;
-  } else {
-    for (const auto& folder : machine_folders(options)) {
-      const fs::path candidate = fs::path(folder) / name_or_file / "machine.toml";
-      if (fs::exists(candidate, error)) {
-        path = candidate.string();
-        break;
-      }
-    }
-  }
+  const std::string path = machine_file_of(name_or_file, options);
   if (path.empty()) {
+    std::error_code error;
     std::string where;
     std::vector<std::string> names;
     for (const auto& folder : machine_folders(options)) {
@@ -165,10 +166,12 @@ Result<LoadedMachine> load_machine(const std::string& name_or_file, const Option
   if (!bytes.ok()) return Result<LoadedMachine>::failure(bytes.diagnostics());
   auto machine = parse_machine_file(bytes.value(), path, overrides);
   if (!machine.ok()) return Result<LoadedMachine>::failure(machine.diagnostics());
-  if (const Diagnostics problems = load_body_meshes(machine.value()); !problems.empty())
+  std::vector<FileHash> files{{path, sha256(bytes.value())}};
+  if (const Diagnostics problems = load_body_meshes(machine.value(), files); !problems.empty())
     return Result<LoadedMachine>::failure(problems);
-  return Result<LoadedMachine>({std::move(machine.value()), path, std::move(bytes.value())},
-                               machine.diagnostics());
+  return Result<LoadedMachine>(
+      {std::move(machine.value()), path, std::move(bytes.value()), std::move(files)},
+      machine.diagnostics());
 }
 
 Result<std::vector<MachineOverride>> overrides_of(const Options& options) {

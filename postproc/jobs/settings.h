@@ -11,6 +11,7 @@
 #include "kernels/core/result.h"
 #include "machines/definition/machine.h"
 #include "machines/definition/machine_file.h"
+#include "postproc/pipeline/hash.h"
 #include "postproc/pipeline/options.h"
 
 namespace smoothpost {
@@ -19,11 +20,15 @@ struct LoadedMachine {
   MachineDefinition definition;
   std::string path;
   std::string text;
+  std::vector<FileHash> files;  ///< the machine file and the meshes of its bodies
 };
 
 /// Folders that machine names are searched in, in order: --machine-path, $SMOOTHPOST_MACHINES, the
 /// installed share/smoothpost/machines and the source tree's machines/ beside the library.
 std::vector<std::string> machine_folders(const Options& options);
+
+/// The file of a machine that is given by name or file; empty when no folder has that name.
+std::string machine_file_of(const std::string& name_or_file, const Options& options);
 
 /// A machine by name or file, with `overrides` applied.
 Result<LoadedMachine> load_machine(const std::string& name_or_file, const Options& options,

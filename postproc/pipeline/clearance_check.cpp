@@ -12,8 +12,9 @@ namespace smoothpost {
 
 namespace {
 
-constexpr double kArm = 1000.0;       // mm, from a rotation's centre to a body
-constexpr double kFirstCap = 1000.0;  // mm: farther distances are not told apart
+constexpr std::size_t kMovesBetweenAsking = 64;  // for progress
+constexpr double kArm = 1000.0;                  // mm, from a rotation's centre to a body
+constexpr double kFirstCap = 1000.0;             // mm: farther distances are not told apart
 
 const char* kPartName = "part";
 
@@ -94,8 +95,13 @@ ClearanceReport check_clearance(const Scene& scene, const ReadBack& joints,
         out.places.push_back({i, report.t, report.pair, report.at.found ? report.at.distance : 0.0,
                               report.at.on_second, report.verdict == MotionVerdict::undecided});
     }
-    if (i % 1024 == 0)
-      progress("clearance", static_cast<double>(i) / static_cast<double>(joints.moves.size()));
+    if (i % kMovesBetweenAsking == 0 &&
+        !progress("clearance", static_cast<double>(i) / static_cast<double>(joints.moves.size()))) {
+      // Cancelled: what comes now is not proven.
+      ++out.moves;
+      out.places.push_back({i, 0.0, 0, 0.0, Vec3::Zero(), true});
+      break;
+    }
   }
   out.queries = cache.queries();
   out.skipped = cache.skipped();

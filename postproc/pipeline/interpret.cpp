@@ -525,7 +525,7 @@ Result<InterpretedInput> interpret_nc(std::string text, const InputSettings& set
   built.value().lines = parsed.program.blocks.size();
   built.value().dialect = dialect_name(dialect.value());
   for (const auto& file : summary.value().files)
-    built.value().files.push_back({file.name, sha256(file.text)});
+    built.value().files.push_back({file.name, sha256(file.text), file.path});
   return Result<InterpretedInput>(std::move(built.value()), std::move(diagnostics));
 }
 

@@ -39,6 +39,7 @@ std::optional<nc::InputDialect> input_dialect(std::string_view name);
 struct InputFile {
   std::string name;  ///< without its folder
   std::string sha256;
+  std::string path;  ///< with it; not part of the report, which is the same on every machine
 };
 
 /// The input as a tool path in the part, with the frames that its words were read in.

@@ -10,9 +10,9 @@ namespace smoothpost {
 /// One run of the tool: every option under the name it has on the command line, in a job file and
 /// in the C structure. Text is as the user wrote it; `settings.h` reads it.
 struct Options {
-  std::string command;                    ///< convert | check | place | machines | formats | golden
-  std::vector<std::string> arguments;     ///< sub-command words: list, show NAME, run DIR ...
-  std::string input;                      ///< path, or "-"
+  std::string command;  ///< convert | check | finish | place | machines | formats | golden | batch
+  std::vector<std::string> arguments;  ///< sub-command words: list, show NAME, run DIR, JOBS.toml
+  std::string input;                   ///< path, or "-"
   std::optional<std::string> input_data;  ///< bytes given by the host instead of a file
   std::string machine;
   std::string machine_path;  ///< folders separated by ':', searched before the others
@@ -64,6 +64,10 @@ struct Options {
   std::string direction;         ///< finish: alternate | same | helical, of the layers
   std::string stock_out;         ///< finish: a path for the STL of the body to be printed
   std::vector<std::string> set;  ///< section.key=value
+  std::string jobs;              ///< batch: how many run at a time
+  std::string only;              ///< batch: the one job to run, in this process
+  std::string worker;            ///< batch: the program that runs a job in a process of its own
+  bool list = false;             ///< batch: name the jobs, run none
   bool no_collision_check = false;
   bool timings = false;
   bool force = false;

@@ -66,6 +66,13 @@ static int count_progress(void* user, const char* stage, double share) {
   return count->cancel_at != 0 && count->calls >= count->cancel_at;
 }
 
+/* A conversion that is over soon. */
+static void first_cut(smoothpost_options* options, const char* source, char* input,
+                      const char* const* tools) {
+  mill_options(options, source, input, tools);
+  options->cuts = "1";
+}
+
 static void check_contract(const char* source) {
   static const char* const tools[] = {"1=60"};
   char input[4096];
@@ -86,7 +93,8 @@ static void check_contract(const char* source) {
   expect(result != NULL && smoothpost_result_diagnostic_count(result) == 1, "one diagnostic");
   diagnostic.size = sizeof diagnostic;
   expect(smoothpost_result_diagnostic(result, 0, &diagnostic) == 0, "diagnostic 0");
-  expect(diagnostic.severity == SMOOTHPOST_ERROR && strcmp(diagnostic.code, "US100") == 0, "its code");
+  expect(diagnostic.severity == SMOOTHPOST_ERROR && strcmp(diagnostic.code, "US100") == 0,
+         "its code");
   expect(smoothpost_result_diagnostic(result, 1, &diagnostic) == -1, "no diagnostic 1");
   smoothpost_result_destroy(result);
 
@@ -108,11 +116,12 @@ static void check_contract(const char* source) {
     expect(size > 0, "a report on refusal");
   }
   diagnostic.size = sizeof diagnostic;
-  expect(smoothpost_result_diagnostic(result, 0, &diagnostic) == 0 && diagnostic.line == 4, "its line");
+  expect(smoothpost_result_diagnostic(result, 0, &diagnostic) == 0 && diagnostic.line == 4,
+         "its line");
   smoothpost_result_destroy(result);
 
   /* Progress, and cancelling. */
-  mill_options(&options, source, input, tools);
+  first_cut(&options, source, input, tools);
   options.progress = count_progress;
   options.progress_user = &count;
   expect(smoothpost_run(&options, &result) == SMOOTHPOST_CERTIFIED, "certified with progress");
@@ -123,8 +132,71 @@ static void check_contract(const char* source) {
   expect(smoothpost_run(&options, &result) != SMOOTHPOST_CERTIFIED, "cancelled");
   smoothpost_result_destroy(result);
 
+  /* Page and plots stay in memory; nothing is made that was not asked for. */
+  first_cut(&options, source, input, tools);
+  options.report = "-";
+  options.plots = "-";
+  expect(smoothpost_run(&options, &result) == SMOOTHPOST_CERTIFIED, "certified with a page");
+  {
+    size_t size = 0;
+    const char* page = smoothpost_result_page(result, &size);
+    expect(size > 1000 && strncmp(page, "<!DOCTYPE html>", 15) == 0, "a page");
+    expect(smoothpost_result_plot_count(result) > 5, "plots");
+    expect(strncmp(smoothpost_result_plot(result, 0, &size), "<svg", 4) == 0 && size > 100,
+           "a plot");
+    expect(strlen(smoothpost_result_plot_name(result, 0)) > 0, "its name");
+    expect(smoothpost_result_plot(result, smoothpost_result_plot_count(result), NULL) == NULL,
+           "no more plots");
+  }
+  smoothpost_result_destroy(result);
+
+  /* A cancelled run has no program, whatever is asked for. */
+  first_cut(&options, source, input, tools);
+  options.force = 1;
+  options.progress = count_progress;
+  options.progress_user = &count;
+  count.calls = 0;
+  count.cancel_at = 0;
+  expect(smoothpost_run(&options, &result) == SMOOTHPOST_CERTIFIED, "not cancelled");
+  smoothpost_result_destroy(result);
+  for (count.cancel_at = count.calls; count.cancel_at > 0; count.cancel_at /= 2) {
+    size_t size = 1;
+    count.calls = 0;
+    expect(smoothpost_run(&options, &result) == SMOOTHPOST_USAGE, "cancelled by force");
+    smoothpost_result_program(result, &size);
+    expect(size == 0, "no program when cancelled");
+    expect(strcmp(smoothpost_result_verdict(result), "refused") == 0, "refused when cancelled");
+    diagnostic.size = sizeof diagnostic;
+    expect(smoothpost_result_diagnostic(result, smoothpost_result_diagnostic_count(result) - 1,
+                                        &diagnostic) == 0 &&
+               strcmp(diagnostic.code, "US190") == 0,
+           "said so");
+    smoothpost_result_destroy(result);
+  }
+
+  /* A caller with a newer header: fine while it asks for nothing new. */
+  {
+    struct {
+      smoothpost_options known;
+      const char* added;
+    } newer;
+    memset(&newer, 0, sizeof newer);
+    first_cut(&newer.known, source, input, tools);
+    newer.known.size = sizeof newer;
+    expect(smoothpost_run(&newer.known, &result) == SMOOTHPOST_CERTIFIED, "newer header");
+    smoothpost_result_destroy(result);
+    newer.added = "something";
+    expect(smoothpost_run(&newer.known, &result) == SMOOTHPOST_USAGE,
+           "an option of a newer header");
+    diagnostic.size = sizeof diagnostic;
+    expect(smoothpost_result_diagnostic(result, 0, &diagnostic) == 0 &&
+               strcmp(diagnostic.code, "US186") == 0,
+           "said so");
+    smoothpost_result_destroy(result);
+  }
+
   /* A caller that was built when the structure ended after `output`. */
-  mill_options(&options, source, input, tools);
+  first_cut(&options, source, input, tools);
   options.size = (size_t)((char*)&options.dialect - (char*)&options);
   options.tool = (const char* const*)1; /* beyond what that caller knew: must not be read */
   expect(smoothpost_run(&options, &result) != SMOOTHPOST_CERTIFIED, "older header");

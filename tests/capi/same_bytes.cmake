@@ -1,21 +1,22 @@
-# The tool and a C caller make the same bytes from the same input.
+# The tool and every C caller make the same bytes from the same input: one built against today's header, one against the
+# first of this ABI.
 file(MAKE_DIRECTORY ${WORK})
-execute_process(
-  COMMAND ${TOOL} convert ${SOURCE}/examples/mill_ac/mill_ac.ngc --input-machine table_table_ac
-          -m table_table_bc --tool 1=60 -o ${WORK}/tool.ngc --json ${WORK}/tool.json
-  RESULT_VARIABLE status)
-if(NOT status EQUAL 0)
-  message(FATAL_ERROR "the tool ended with ${status}")
-endif()
-execute_process(COMMAND ${CALLER} convert ${SOURCE} ${WORK}/caller.ngc ${WORK}/caller.json
-                RESULT_VARIABLE status)
-if(NOT status EQUAL 0)
-  message(FATAL_ERROR "the caller ended with ${status}")
-endif()
-foreach(kind ngc json)
-  file(READ ${WORK}/tool.${kind} tool HEX)
-  file(READ ${WORK}/caller.${kind} caller HEX)
-  if(NOT tool STREQUAL caller)
-    message(FATAL_ERROR "tool.${kind} and caller.${kind} differ")
+function(run)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE status)
+  if(NOT status EQUAL 0)
+    message(FATAL_ERROR "${ARGN} ended with ${status}")
   endif()
+endfunction()
+run(${TOOL} convert ${SOURCE}/examples/mill_ac/mill_ac.ngc --input-machine table_table_ac
+    -m table_table_bc --tool 1=60 -o ${WORK}/tool.ngc --json ${WORK}/tool.json)
+run(${CALLER} convert ${SOURCE} ${WORK}/caller.ngc ${WORK}/caller.json)
+run(${OLD_CALLER} ${SOURCE} ${WORK}/old_caller.ngc ${WORK}/old_caller.json)
+foreach(caller caller old_caller)
+  foreach(kind ngc json)
+    file(READ ${WORK}/tool.${kind} tool HEX)
+    file(READ ${WORK}/${caller}.${kind} made HEX)
+    if(NOT tool STREQUAL made)
+      message(FATAL_ERROR "tool.${kind} and ${caller}.${kind} differ")
+    endif()
+  endforeach()
 endforeach()

@@ -75,7 +75,8 @@ TEST_CASE("run_job: page and plots of convert and of check and of an input that 
 TEST_CASE("write_plots: a folder that cannot be made is told", "[postproc][jobs][report]") {
   const fs::path folder = scratch("blocked");
   std::ofstream(folder / "file") << "x";
-  const auto problems = write_plots((folder / "file/below").string(), {});
+  std::vector<FileHash> written;
+  const auto problems = write_plots((folder / "file/below").string(), {}, written);
   REQUIRE(problems.size() == 1);
   CHECK(problems[0].code == "US131");
 }

@@ -2,9 +2,13 @@
  *
  * One call runs one command of the tool. Handles are opaque and come in create/destroy pairs;
  * structures begin with their size, so that a caller built against an older header keeps working;
- * enum values never change. No exceptions cross it, nothing is printed, no locale and no global
- * state is touched: calls with different arguments may run on different threads at the same time.
- * Strings are UTF-8.
+ * enum values never change. No exceptions cross it, nothing is printed, no locale is touched.
+ * Strings are UTF-8. What stays as it is from version to version: docs/how_to/plugin.md.
+ *
+ * Threads: calls with different arguments may run on different threads at the same time and give
+ * the bytes that they give alone. A result may be read from several threads, as long as none
+ * destroys it. Solves by Ipopt wait for each other inside the library; a host that uses Ipopt 3.11
+ * itself must not do so meanwhile.
  *
  *   smoothpost_options options;
  *   smoothpost_options_init(&options, sizeof options);
@@ -53,14 +57,15 @@ typedef enum smoothpost_severity {
 } smoothpost_severity;
 
 /* Called from the thread that runs the command, now and then: `share` done in [0, 1] of `stage`.
- * Returns 0 to go on, anything else to cancel. */
+ * Returns 0 to go on, anything else to cancel: the command then ends with status
+ * SMOOTHPOST_USAGE, a diagnostic US190 and no program. */
 typedef int (*smoothpost_progress)(void* user, const char* stage, double share);
 
 /* Every option of the command line under its name there; NULL or 0 means not given. */
 typedef struct smoothpost_options {
   size_t size; /* sizeof(smoothpost_options) of the caller; set by smoothpost_options_init */
-  const char* command;          /* convert | check | finish | place | machines | formats | golden */
-  const char* const* arguments; /* words after the command: list, show NAME, run DIR */
+  const char* command; /* convert | check | finish | place | machines | formats | golden | batch */
+  const char* const* arguments; /* words after the command: list, show NAME, run DIR, JOBS.toml */
   size_t argument_count;
   const char* input; /* a path; with input_data only a name for messages */
   const void* input_data;
@@ -95,7 +100,7 @@ typedef struct smoothpost_options {
   const char* cuts;
   const char* against;
   const char* json;
-  const char* report;
+  const char* report; /* a path; "-": only in the result */
   const char* trajectory;
   const char* line_map;
   const char* const* set;
@@ -106,25 +111,30 @@ typedef struct smoothpost_options {
   smoothpost_progress progress;
   void* progress_user;
   const char* integer_unit; /* fanuc, haas: what one unit of a number without point is: 1 | 0.001 */
-  const char* box;  /* place: x0,y0,z0,x1,y1,z1: where the program's zero may lie, mm */
-  const char* turn; /* place: largest turn about the vertical, deg */
-  const char* input_unit; /* cl: mm | inch, of lengths before UNITS */
-  const char* input_feed; /* cl: mm/min, of feed motions before FEDRAT */
-  const char* cl_frames;  /* cl: one | reported | applied */
-  const char* cl_circles; /* cl: tangents | cw | ccw */
-  const char* plots; /* a folder for the plots of the report page, as SVG files */
-  const char* pitch; /* finish: mm, between layers */
-  const char* depth; /* finish: mm, depth of cut: the stock is that much larger */
-  const char* feed; /* finish: mm/min */
-  const char* rpm; /* finish: of the spindle */
-  const char* from; /* finish: mm, height of the first layer */
-  const char* to; /* finish: mm, no layer above */
+  const char* box;          /* place: x0,y0,z0,x1,y1,z1: where the program's zero may lie, mm */
+  const char* turn;         /* place: largest turn about the vertical, deg */
+  const char* input_unit;   /* cl: mm | inch, of lengths before UNITS */
+  const char* input_feed;   /* cl: mm/min, of feed motions before FEDRAT */
+  const char* cl_frames;    /* cl: one | reported | applied */
+  const char* cl_circles;   /* cl: tangents | cw | ccw */
+  const char* plots;   /* a folder for the page's plots as SVG files; "-": only in the result */
+  const char* pitch;   /* finish: mm, between layers */
+  const char* depth;   /* finish: mm, depth of cut: the stock is that much larger */
+  const char* feed;    /* finish: mm/min */
+  const char* rpm;     /* finish: of the spindle */
+  const char* from;    /* finish: mm, height of the first layer */
+  const char* to;      /* finish: mm, no layer above */
   const char* lead_in; /* finish: mm, radius of the arcs that lead in and out */
   const char* normal_tolerance; /* finish: deg, of the tool axis against the surface's normal */
-  const char* direction; /* finish: alternate | same | helical, of the layers */
-  const char* stock_out; /* finish: a path for the STL of the body to be printed */
+  const char* direction;        /* finish: alternate | same | helical, of the layers */
+  const char* stock_out;        /* finish: a path for the STL of the body to be printed */
   const char* run_budget; /* nc: blocks that loops, calls and cycles may run beyond the text */
   const char* call_depth; /* nc: calls within each other */
+  const char* jobs;             /* batch: how many run at a time; default one a processor */
+  const char* only;             /* batch: the one job to run, in this process */
+  const char* worker; /* batch: the program that runs a job; default the smoothpost beside the
+                         library */
+  int list;           /* batch: names the jobs in the result's text, runs none */
 } smoothpost_options;
 
 /* All members to "not given". `size` is sizeof(smoothpost_options) as the caller knows it. */
@@ -134,7 +144,9 @@ SMOOTHPOST_API void smoothpost_options_init(smoothpost_options* options, size_t 
 typedef struct smoothpost_result smoothpost_result;
 
 /* Runs one command. *result is set in every case except when memory is short or an argument is
- * NULL, and is to be destroyed by the caller. Returns its status. */
+ * NULL, and is to be destroyed by the caller. Returns its status. Members that this library is too
+ * old to know have to be 0: else status SMOOTHPOST_USAGE, US186. Batch starts processes, and waits
+ * for its own only. */
 SMOOTHPOST_API smoothpost_status smoothpost_run(const smoothpost_options* options,
                                                 smoothpost_result** result);
 SMOOTHPOST_API void smoothpost_result_destroy(smoothpost_result* result);
@@ -149,14 +161,23 @@ SMOOTHPOST_API const char* smoothpost_result_line_map(const smoothpost_result* r
                                                       size_t* size);
 SMOOTHPOST_API const char* smoothpost_result_trajectory(const smoothpost_result* result,
                                                         size_t* size);
-/* Text for people: of place, machines, formats and golden. */
+/* The report page, one HTML file, when `report` or `plots` was given. */
+SMOOTHPOST_API const char* smoothpost_result_page(const smoothpost_result* result, size_t* size);
+/* The plots of the page as SVG files: how many, the name of one (without .svg), its bytes. NULL
+ * when there is no such index. */
+SMOOTHPOST_API size_t smoothpost_result_plot_count(const smoothpost_result* result);
+SMOOTHPOST_API const char* smoothpost_result_plot_name(const smoothpost_result* result,
+                                                       size_t index);
+SMOOTHPOST_API const char* smoothpost_result_plot(const smoothpost_result* result, size_t index,
+                                                  size_t* size);
+/* Text for people: of place, machines, formats, golden and batch. */
 SMOOTHPOST_API const char* smoothpost_result_text(const smoothpost_result* result, size_t* size);
 SMOOTHPOST_API const char* smoothpost_result_verdict(const smoothpost_result* result);
 /* One line: verdict, checks, deviations, time. */
 SMOOTHPOST_API const char* smoothpost_result_summary(const smoothpost_result* result);
 
 typedef struct smoothpost_diagnostic {
-  size_t size; /* set by the caller to sizeof(smoothpost_diagnostic) */
+  size_t size; /* set by the caller to sizeof(smoothpost_diagnostic): no member beyond is written */
   smoothpost_severity severity;
   const char* code;
   const char* text;
