@@ -53,6 +53,11 @@ foreach(machine_file ${machine_files})
   get_filename_component(machine ${machine_file} DIRECTORY)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/machines/${machine} DESTINATION ${SMOOTHPOST_MACHINES_DIR})
 endforeach()
+# What a host loads: FreeCAD's addon, LinuxCNC's filter section.
+set(SMOOTHPOST_HOSTS_DIR ${CMAKE_INSTALL_DATADIR}/smoothpost/hosts)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/postproc/hosts/ DESTINATION ${SMOOTHPOST_HOSTS_DIR}
+  PATTERN __pycache__ EXCLUDE)
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${SMOOTHPOST_HOSTS_DIR}/freecad)
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/docs/licences.md
   DESTINATION ${CMAKE_INSTALL_DOCDIR})
 

@@ -69,6 +69,14 @@ def main():
         shown = run(prefix / "bin/smoothpost", "machines", "show", "laser_5p1", cwd=folder, env=clean)
         expect("laser_5p1" in shown, "machines show names the machine")
 
+        # FreeCAD's post finds the tool that it was installed with.
+        post = prefix / "share/smoothpost/hosts/freecad/posts"
+        found = run(sys.executable, "-B", "-c", "import smoothpost_post; print(smoothpost_post.find_tool(None))",
+                    cwd=post, env={key: value for key, value in clean.items() if key != "SMOOTHPOST"})
+        expect(Path(found.strip()).samefile(prefix / "bin/smoothpost"), f"the post finds {found.strip()}")
+        expect((prefix / "share/smoothpost/hosts/freecad/package.xml").exists(), "FreeCAD's addon is installed")
+        expect((prefix / "share/smoothpost/hosts/linuxcnc/filter.ini").exists(), "LinuxCNC's filter section is installed")
+
         # find_package
         build = folder / "stranger_cmake"
         run(given.cmake, "-S", given.stranger, "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}",

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Plays a --trajectory file through LinuxCNC's HAL and measures what comes out of its pins.
 
-    stream_check.py --smoothpost TOOL --limits MACHINE.toml -- CONVERT_ARGUMENTS...
+    stream_check.py --smoothpost TOOL --limits MACHINE.toml [--optional] -- INPUT CONVERT_ARGUMENTS...
 
 The file is fed to HAL's `streamer` by `halstreamer` in a 1 kHz thread, and `sampler` logs the same pins
 in every cycle, as on a machine whose joints the streamer moves. Held against the plan: the time
@@ -119,14 +119,18 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--smoothpost", required=True)
     parser.add_argument("--limits", required=True)
+    parser.add_argument("--optional", action="store_true", help="skip where the input is not there")
     parser.add_argument("arguments", nargs=argparse.REMAINDER)
     options = parser.parse_args()
+    arguments = [a for a in options.arguments if a != "--"]
+    if options.optional and not os.path.exists(arguments[0]):
+        print(f"skipped: {arguments[0]} is not here")
+        sys.exit(SKIP)
     if not all(shutil.which(tool) for tool in ("halrun", "halstreamer", "halsampler")):
         print("LinuxCNC's HAL is not installed")
         sys.exit(SKIP)
     with tempfile.TemporaryDirectory() as work:
         csv = os.path.join(work, "joints.csv")
-        arguments = [a for a in options.arguments if a != "--"]
         made = subprocess.run([options.smoothpost, "convert", *arguments, "-o",
                                os.path.join(work, "program.out"), "--trajectory", csv,
                                "--set", "cycle.time_ms=1"], check=False)
