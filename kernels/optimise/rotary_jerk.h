@@ -1,8 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "kernels/kinematics/screw_chain.h"
+#include "kernels/optimise/path_law.h"
 #include "kernels/optimise/standoff.h"
 #include "kernels/qp/qp_solver.h"
 
@@ -47,6 +49,9 @@ struct RotaryProblem {
   std::array<RateLimits, 2> limits;         ///< by u; infinity: none
   bool rest_at_ends = true;                 ///< q' = q'' = 0 at both ends
   bool monotone = false;  ///< between two vias no rotary turns back, flat where both are equal
+  /// Given: the objective counts in time, and of `limits` only the jerk, by time, rad and s, weighs
+  /// the rotaries; not with `monotone`.
+  std::optional<PathLaw> law = std::nullopt;
 };
 
 struct RotarySettings {
@@ -66,8 +71,9 @@ enum class RotaryStatus {
 
 struct RotaryResult {
   RotaryStatus status = RotaryStatus::solver_failed;
-  SplineCurve q;               ///< two components, rad
-  QpSolution solution;         ///< of the last pass; objective Σ ∫ (q''')² du, rad²/u⁵
+  SplineCurve q;        ///< two components, rad
+  QpSolution solution;  ///< of the last pass; its objective Σ ∫ (q''')² du, rad²/u⁵, or
+                        ///< with a law the mean of Σ (q⃛/limit)² over the time
   QuadraticProgram programme;  ///< of the last pass, when there is a solution
   int passes = 0;
   double outside = 0.0;  ///< largest OrientationWindow::outside at the windows
@@ -86,6 +92,10 @@ struct RotaryResult {
 /// quadratic programming): it vanishes where passes stand still, and without it they swing where
 /// the objective is flat. Passes repeat until the windows hold to 1e-9 and the rotaries stand still
 /// to 1e-7 or the objective to 1e-5; one that violates more than the one before goes half the way.
+/// With a law (the schedule of an earlier shape) the same in its metric: Σ ∫ (q⃛/limit)² dt by 5
+/// Gauss points a piece, and no limits of derivatives: how fast the new shape may be is for its own
+/// schedule to say. (Rows that keep it below its limits under the law make it cling to the old one:
+/// Case 2 gains 1.1 % in two passes with them and 8.3 % without.)
 /// Guarantees (tests): every window holds at its place; limits hold everywhere (control points);
 /// KKT of the last programme; via points exact; deterministic; monotone: the control points of the
 /// first derivative that reach between two vias have the sign of the step, 0 where it turns around.
@@ -95,9 +105,10 @@ struct RotaryResult {
 /// unwound; windows at every cutter location take their place.
 RotaryResult optimise_rotaries(const RotaryProblem& problem, const RotarySettings& settings = {});
 
-/// The last programme of a result of optimise_rotaries() once more by Ipopt: what `hybrid` does.
-/// @pre result.status optimal   @return solver_failed when Ipopt has no optimum
-RotaryResult polish_rotaries(RotaryResult result, const RotarySettings& settings);
+/// The last programme of a result of optimise_rotaries(problem) once more by Ipopt: what `hybrid`
+/// does.   @pre result.status optimal   @return solver_failed when Ipopt has no optimum
+RotaryResult polish_rotaries(const RotaryProblem& problem, RotaryResult result,
+                             const RotarySettings& settings);
 
 /// By how much a stretch has to slow down so that the rotaries keep their limits, and why.
 struct RotaryTime {

@@ -1,6 +1,7 @@
 #include "kernels/optimise/standoff.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -64,6 +65,7 @@ struct Place {
   double u = 0.0;
   double weight = 0.0;  ///< of the quadrature
   LinearsByStandoff linears;
+  PathSpeed speed = {};  ///< of the law; without one derivatives by time are those by u
 };
 
 /// What does not change with the limits.
@@ -73,7 +75,9 @@ struct Task {
   double half = 0.0;
   std::vector<Place> quadrature;
   std::vector<Place> row_places;
-  double held_jerk = 0.0;  ///< Σ ∫ (q_i''')² du with q6 in the middle
+  double held_jerk = 0.0;  ///< Σ ∫ (q_i''')² du with q6 in the middle; with a law by time
+  double fastest = 1.0;    ///< du/dt
+  double time = 0.0;       ///< the length without a law
 
   double length() const { return knots.last() - knots.first(); }
 };
@@ -90,6 +94,21 @@ Place place_at(const HeadGeometry& head, const SplineCurve& tip, const SplineCur
     q5[r] = angles[1];
   }
   return {u, 0.0, linears_by_standoff(head, tip_jet, q4, q5)};
+}
+
+/// Weights of the derivatives by u, orders 1 to 3, in that by time of an order.
+std::array<double, 3> time_weights_of(const Place& place, int order) {
+  const TimeWeights w = time_weights(place.speed, order);
+  return {w.first, w.second, w.third};
+}
+
+/// The derivative by time of that order of the linears with q6 in the middle.
+Vec3 held_motion(const Place& place, int order) {
+  const auto weights = time_weights_of(place, order);
+  Vec3 motion = Vec3::Zero();
+  for (int n = 1; n <= order; ++n)
+    if (weights[n - 1] != 0.0) motion += weights[n - 1] * place.linears.a.col(n);
+  return motion;
 }
 
 void check(const SplineCurve& tip, const SplineCurve& rotary, const StandoffOptions& settings) {
@@ -129,6 +148,11 @@ Task task_of(const HeadGeometry& head, const SplineCurve& tip, const SplineCurve
     Place& place = places.back();
     place.weight = weight;
     place.linears.a += task.middle * place.linears.b;
+    if (!settings.law) return;
+    place.speed = settings.law->at(u);
+    require(weight == 0.0 || place.speed.first > 0.0,
+            "optimise_standoff: a law that goes on between its ends");
+    if (weight > 0.0) place.weight /= place.speed.first;
   };
   const GaussRule& rule = gauss_rule(kGaussPoints);
   for (int span = 0; span < task.knots.spans(); ++span) {
@@ -136,24 +160,37 @@ Task task_of(const HeadGeometry& head, const SplineCurve& tip, const SplineCurve
     const double length = task.knots.values[span + kDegree + 1] - first;
     for (int g = 0; g < rule.points; ++g)
       add(task.quadrature, first + length * rule.nodes[g], length * rule.weights[g]);
-    for (int n = 0; n < settings.rows_per_span; ++n)
+    for (int n = 0; n < settings.rows_per_span && !settings.law; ++n)
       add(task.row_places, first + length * n / settings.rows_per_span, 0.0);
   }
-  add(task.row_places, task.knots.last(), 0.0);
-  for (const Place& place : task.quadrature)
-    task.held_jerk += place.weight * place.linears.a.col(3).squaredNorm();
+  if (!settings.law) add(task.row_places, task.knots.last(), 0.0);
+  task.time = settings.law ? settings.law->duration : task.length();
+  if (settings.law) task.fastest = 0.0;
+  for (const Place& place : task.quadrature) {
+    task.held_jerk += place.weight * held_motion(place, 3).squaredNorm();
+    task.fastest = std::max(task.fastest, place.speed.first);
+  }
   return task;
 }
 
-/// Σ ∫ (q_i''')² du with q6 = middle + offset.
+/// The derivative by time of that order of the linears with q6 = middle + offset.
+Vec3 linear_motion(const Place& place, const SplineCurve& offset, int order) {
+  Vec3 motion = held_motion(place, order);
+  const auto weights = time_weights_of(place, order);
+  for (int n = 1; n <= order; ++n) {
+    if (weights[n - 1] == 0.0) continue;
+    for (int s = 0; s <= n; ++s)
+      motion +=
+          weights[n - 1] * kBinomial[n][s] * offset.at(place.u, s)[0] * place.linears.b.col(n - s);
+  }
+  return motion;
+}
+
+/// Σ ∫ (q_i''')² du with q6 = middle + offset; with a law by time.
 double jerk_integral(const Task& task, const SplineCurve& offset) {
   double sum = 0.0;
-  for (const Place& place : task.quadrature) {
-    Vec3 jerk = place.linears.a.col(3);
-    for (int s = 0; s < 4; ++s)
-      jerk += kBinomial[3][s] * offset.at(place.u, s)[0] * place.linears.b.col(3 - s);
-    sum += place.weight * jerk.squaredNorm();
-  }
+  for (const Place& place : task.quadrature)
+    sum += place.weight * linear_motion(place, offset, 3).squaredNorm();
   return sum;
 }
 
@@ -180,12 +217,17 @@ LocalBasis local_basis(const SplineLayout& layout, double u) {
 
 using LinearWeights = Eigen::Matrix<double, kDegree + 1, 3>;
 
-/// Weights of the piece's variables in the derivative of that order of the linears (columns).
+/// Weights of the piece's variables in the derivative by time of that order of the linears
+/// (columns).
 LinearWeights linear_weights(const LocalBasis& basis, const Place& place, int order) {
   LinearWeights weights = LinearWeights::Zero();
-  for (int s = 0; s <= order; ++s)
-    weights +=
-        kBinomial[order][s] * basis.weights.col(s) * place.linears.b.col(order - s).transpose();
+  const auto of = time_weights_of(place, order);
+  for (int n = 1; n <= order; ++n) {
+    if (of[n - 1] == 0.0) continue;
+    for (int s = 0; s <= n; ++s)
+      weights += of[n - 1] * kBinomial[n][s] * basis.weights.col(s) *
+                 place.linears.b.col(n - s).transpose();
+  }
   return weights;
 }
 
@@ -193,12 +235,13 @@ LinearWeights linear_weights(const LocalBasis& basis, const Place& place, int or
 /// of its range to the other with kJerks times the jerk that the linears have with it held.
 SplineLayout layout_of(const Task& task, const RateLimits& limits) {
   SplineLayout layout = spline_layout(task.knots, kLevels, 1);
-  const double rms = std::sqrt(task.held_jerk / task.length());
+  const double rms = std::sqrt(task.held_jerk / task.time) / std::pow(task.fastest, 3);
   const double travel = std::clamp(std::cbrt(task.half / std::max(kJerks * rms, kTiny)),
                                    task.length() / layout.spans(), task.length());
+  const RateLimits by_parameter = slowed(limits, 1.0 / task.fastest);
   for (int level = 0; level <= kLevels; ++level) {
     const double size = task.half / std::pow(travel, level);
-    layout.scale(0, level) = level == 0 ? size : std::min(limit_of(limits, level), size);
+    layout.scale(0, level) = level == 0 ? size : std::min(limit_of(by_parameter, level), size);
   }
   return layout;
 }
@@ -247,9 +290,7 @@ bool tighten(const std::vector<Place>& between, const SplineCurve& offset,
   std::array<std::array<std::vector<double>, 3>, 3> values;  // of joint and order
   for (const Place& place : between)
     for (int order = 1; order <= 3; ++order) {
-      Vec3 value = place.linears.a.col(order);
-      for (int s = 0; s <= order; ++s)
-        value += kBinomial[order][s] * offset.at(place.u, s)[0] * place.linears.b.col(order - s);
+      const Vec3 value = linear_motion(place, offset, order);
       for (int i = 0; i < 3; ++i) values[i][order - 1].push_back(value[i]);
     }
   bool exceeded = false;
@@ -266,8 +307,8 @@ bool tighten(const std::vector<Place>& between, const SplineCurve& offset,
 
 /// What the objective is divided by.
 double objective_scale(const Task& task, const SplineLayout& layout) {
-  const double jerk = layout.scale(0, kLevels);
-  return std::max(task.held_jerk, kLeastObjective * jerk * jerk * task.length());
+  const double jerk = layout.scale(0, kLevels) * std::pow(task.fastest, 3);
+  return std::max(task.held_jerk, kLeastObjective * jerk * jerk * task.time);
 }
 
 void add_objective(QuadraticProgram& qp, const Task& task, const StandoffOptions& settings) {
@@ -275,14 +316,15 @@ void add_objective(QuadraticProgram& qp, const Task& task, const StandoffOptions
   for (const Place& place : task.quadrature) {
     const LocalBasis basis = local_basis(qp.layout, place.u);
     const LinearWeights weights = linear_weights(basis, place, 3);
-    const Vec3 jerk = place.linears.a.col(3);
+    const Vec3 jerk = held_motion(place, 3);
     const double share = place.weight / scale;
     qp.hessian.middleCols(basis.span * (kDegree + 1), kDegree + 1) +=
         2.0 * share * weights * weights.transpose();
     qp.gradient.col(basis.span) += 2.0 * share * weights * jerk;
     qp.constant += share * jerk.squaredNorm();
   }
-  add_derivative_cost(qp, 0, 3, 2.0 * settings.regularisation / scale);
+  const double mean = task.length() / task.time;  // 1 without a law
+  add_derivative_cost(qp, 0, 3, 2.0 * settings.regularisation * std::pow(mean, 5) / scale);
   add_derivative_cost(qp, 0, 0, 2.0 * settings.pull / (task.length() * task.half * task.half));
 }
 
@@ -293,7 +335,7 @@ void fix(QuadraticProgram& qp, int level, int j, double value) {
 
 void add_bounds(QuadraticProgram& qp, const Task& task, const StandoffOptions& settings) {
   limit_level(qp, 0, 0, task.half);
-  for (int level = 1; level <= kLevels; ++level)
+  for (int level = 1; level <= kLevels && !settings.law; ++level)
     limit_level(qp, 0, level, limit_of(settings.standoff, level));
   const auto last = [&](int level) { return qp.layout.count(level) - 1; };
   for (int level = 1; settings.rest_at_ends && level <= 2; ++level) {
@@ -315,7 +357,7 @@ void add_place_rows(std::vector<NewRow>& rows, const SplineLayout& layout, const
   }
 }
 
-/// Limits of the linears at the places, each divided by the limit.
+/// Limits of the linears at the places, each divided by the limit; none with a law.
 void add_rows(QuadraticProgram& qp, const Task& task, const StandoffOptions& settings) {
   std::vector<NewRow> rows;
   add_place_rows(rows, qp.layout, task, settings);
@@ -323,10 +365,11 @@ void add_rows(QuadraticProgram& qp, const Task& task, const StandoffOptions& set
     const LocalBasis basis = local_basis(qp.layout, place.u);
     for (int order = 1; order <= 3; ++order) {
       const LinearWeights weights = linear_weights(basis, place, order);
+      const Vec3 of_held = held_motion(place, order);
       for (int i = 0; i < 3; ++i) {
         const double limit = limit_of(settings.linear[i], order);
         if (!std::isfinite(limit)) continue;
-        const double held = place.linears.a(i, order) / limit;
+        const double held = of_held[i] / limit;
         rows.push_back({{basis.span, weights.col(i) / limit},
                         -1.0 - held,
                         1.0 - held,
@@ -427,7 +470,8 @@ StandoffResult optimise_standoff(const HeadGeometry& head, const SplineCurve& ti
   for (int round = 0;; ++round) {
     qp = programme(task, tight);
     result.solution = solve_qp(qp, solver);
-    if (result.solution.status != QpStatus::optimal || round == kMostTightenings) break;
+    if (result.solution.status != QpStatus::optimal || settings.law || round == kMostTightenings)
+      break;
     if (!tighten(between, {qp.layout.knots, controls_of(qp.layout, result.solution.x)}, settings,
                  tight))
       break;
@@ -438,7 +482,7 @@ StandoffResult optimise_standoff(const HeadGeometry& head, const SplineCurve& ti
   if (result.solution.status == QpStatus::optimal) {
     result.q6.controls = controls_of(qp.layout, result.solution.x);
     result.jerk_after = jerk_integral(task, result.q6);
-  } else {
+  } else if (!settings.law) {
     result.feasibility = ask_feasibility(qp, settings);
     if (result.feasibility.shortfall > kFeasible &&
         result.feasibility.solution.status == QpStatus::optimal)
@@ -450,6 +494,7 @@ StandoffResult optimise_standoff(const HeadGeometry& head, const SplineCurve& ti
 
 StandoffTimeFactor least_standoff_time(const HeadGeometry& head, const SplineCurve& tip,
                                        const SplineCurve& rotary, const StandoffOptions& settings) {
+  require(!settings.law, "least_standoff_time: limits by u");
   const Task task = task_of(head, tip, rotary, settings);
   StandoffTimeFactor out;
   Bracket bracket;

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "kernels/kinematics/head_geometry.h"
+#include "kernels/optimise/path_law.h"
 #include "kernels/qp/qp_solver.h"
 #include "kernels/spline/bspline_basis.h"
 
@@ -38,6 +40,8 @@ struct StandoffOptions {
   double start = 0.0, end = 0.0;  ///< q6 at the ends that are fixed, mm, in range
   bool fixed_start = false, fixed_end = false;
   std::vector<StandoffBound> bounds = {};  ///< in any order
+  /// Given: the objective counts in time, and limits of derivatives do not count.
+  std::optional<PathLaw> law = std::nullopt;
   QpSettings solver;
   bool hybrid = false;  ///< banded, then once more by Ipopt (solve_by_hybrid)
 };
@@ -45,12 +49,13 @@ struct StandoffOptions {
 /// The standoff that makes the linear axes smoothest, for given tip and rotaries.
 struct StandoffResult {
   /// Its x are the lifted variables of q6 − (lower + upper)/2, scaled. Its objective is unscaled:
-  /// Σ ∫ (q_i''')² du + ε ∫ (q6''')² du and the pull, mm²/u⁵.
+  /// Σ ∫ (q_i''')² du + ε ∫ (q6''')² du and the pull, mm²/u⁵; with a law Σ ∫ (q⃛_i)² dt, mm²/s⁵.
   QpSolution solution;
   QpFeasibility feasibility;  ///< asked when it has no solution; relaxed as for the time factor
   SplineCurve q6;             ///< one component; the held standoff when there is no solution
-  double jerk_before = 0.0;   ///< Σ ∫ (q_i''')² du with q6 held in mid-range or at `start`
-  double jerk_after = 0.0;    ///< the same with q6
+  /// Σ ∫ (q_i''')² du (with a law ∫ (q⃛_i)² dt) with q6 held in mid-range or at `start`
+  double jerk_before = 0.0;
+  double jerk_after = 0.0;  ///< the same with q6
 };
 
 /// minimise over a quintic spline q6(u), on the knots of the rotaries,
@@ -59,11 +64,13 @@ struct StandoffResult {
 /// points, |q_i'|, |q_i''|, |q_i'''| limits at places of each piece, the bounds at their places,
 /// and q6' = q6'' = 0 at the ends. Where a limit of q1 … q3 is exceeded between those places
 /// (looked for at 12 places a piece and the parabolas through them) its rows are narrowed by that
-/// share and 2e-4, and the programme is solved again, at most three times. Convex; tip and tool
-/// axis are not touched by any q6. Guarantees (tests): golden qp_q6 of paper_b.json; limits hold on
-/// a dense grid, bounds at their places; the tip stays to 1e-9 mm; not above the held standoff.
-/// Units: mm, rad, and u as the knots have it (unit pieces keep the numbers well conditioned).
-/// Cost: linear in the pieces, allocates.
+/// share and 2e-4, and the programme is solved again, at most three times. With a law (the schedule
+/// of an earlier shape) the same in its metric: q⃛_i and dt in the objective, ε ∫ (q6''')² at its
+/// mean speed, range and bounds of q6, and no other limits: they are its own schedule's. Convex;
+/// tip and tool axis are not touched by any q6. Guarantees (tests): golden qp_q6 of paper_b.json;
+/// limits hold on a dense grid, bounds at their places; the tip stays to 1e-9 mm; not above the
+/// held standoff. Units: mm, rad, and u as the knots have it (unit pieces keep the numbers well
+/// conditioned). Cost: linear in the pieces, allocates.
 /// @param tip 3 components, mm, W   @param rotary 2 components, rad; both on clamped quintic knots
 /// over the same range; `tip` may have other knots.
 /// @pre as said at the parameters; limits > 0, rows_per_span ≥ 1, ε and pull ≥ 0, ends in range
@@ -90,7 +97,7 @@ struct StandoffTimeFactor {
 /// t(1 + 3τ)^(1/3) ≤ t* ≤ t(1 + τ): every programme gives a bracket, and near the solution its
 /// width is τ².
 /// Guarantees (tests): feasible at the factor, infeasible 1e-4 below it.
-/// Units, @param, @pre as optimise_standoff().   Cost: three to six programmes.
+/// Units, @param, @pre as optimise_standoff(), without a law.   Cost: three to six programmes.
 StandoffTimeFactor least_standoff_time(const HeadGeometry& head, const SplineCurve& tip,
                                        const SplineCurve& rotary, const StandoffOptions& settings);
 

@@ -1,6 +1,8 @@
+#include <algorithm>
 #include <cmath>
 
 #include "kernels/qp/banded_solver.h"
+#include "kernels/qp/equilibrate.h"
 #include "kernels/qp/qp_solver.h"
 
 namespace smoothpost {
@@ -9,11 +11,23 @@ namespace {
 
 constexpr double kObjectiveShare = 1e-7;  // of the objective: makes the answer unique
 constexpr double kLeastTau = -1.0;        // limits of ±1 have no room left there
+constexpr double kUsualObjective = 1024;  // curvature of all pieces that needs no other share
 
 Eigen::VectorXd limited_weights(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) {
   Eigen::VectorXd weight(lower.size());
   for (Eigen::Index k = 0; k < weight.size(); ++k) weight[k] = lower[k] == upper[k] ? 0.0 : 1.0;
   return weight;
+}
+
+/// kObjectiveShare of an objective of the usual size.
+double objective_share(const QuadraticProgram& qp) {
+  const int local = qp.layout.local_size();
+  double most = 0.0;
+  for (int span = 0; span < qp.layout.spans(); ++span)
+    most = std::max(most, qp.hessian.middleCols(span * local, local).diagonal().maxCoeff());
+  const double whole = most * qp.layout.spans();
+  const bool usual = whole <= kUsualObjective && whole * kUsualObjective >= 1.0;
+  return usual || !(whole > 0.0) ? kObjectiveShare : kObjectiveShare / whole;
 }
 
 /// The limit with the largest share in the multiplier of τ.
@@ -45,7 +59,8 @@ void name_limit(const QuadraticProgram& qp, QpFeasibility& out) {
 }  // namespace
 
 QpFeasibility feasibility(const QuadraticProgram& qp, const QpSettings& settings) {
-  QuadraticProgram elastic = qp;
+  Equilibrated scaled = equilibrated(qp);
+  QuadraticProgram& elastic = scaled.qp;
   if (!elastic.relaxation) {
     elastic.relaxation.emplace();
     elastic.relaxation->bound_weight = limited_weights(qp.lower, qp.upper);
@@ -53,9 +68,10 @@ QpFeasibility feasibility(const QuadraticProgram& qp, const QpSettings& settings
   }
   elastic.relaxation->cost = 1.0;
   elastic.relaxation->lower = kLeastTau;
-  elastic.hessian *= kObjectiveShare;
-  elastic.gradient *= kObjectiveShare;
-  elastic.constant *= kObjectiveShare;
+  const double share = objective_share(elastic);
+  elastic.hessian *= share;
+  elastic.gradient *= share;
+  elastic.constant *= share;
   QpSettings s = settings;
   s.solver = QpSolver::banded;
   s.tolerance = std::max(settings.tolerance, 1e-8);
@@ -66,6 +82,8 @@ QpFeasibility feasibility(const QuadraticProgram& qp, const QpSettings& settings
       out.solution.status == QpStatus::optimal || out.solution.certificate.violation < 1e-7;
   out.feasible = solved && out.shortfall <= s.tolerance;
   name_limit(elastic, out);
+  out.solution = in_given_units(scaled, std::move(out.solution));
+  out.solution.objective = objective_value(qp, out.solution.x);
   return out;
 }
 

@@ -29,6 +29,7 @@ class InteriorPoint {
   using Local = typename Recursion::Local;
   using LocalMatrix = typename Recursion::LocalMatrix;
   using State = typename Recursion::State;
+  using Term = typename Recursion::Factor::Term;
   using Path = typename Limits::Path;
   using Array = Eigen::ArrayXd;
   static constexpr int kStates = Recursion::kStates;
@@ -103,24 +104,28 @@ class InteriorPoint {
       }
     }
     slope_ = gradient_;
-    squares_.reserve(hessian_.size());
-    for (const LocalMatrix& h : hessian_) squares_.push_back(squares_of(h));
+    int most = 0;
+    for (int i = 0; i <= spans_; ++i) {
+      first_square_.push_back(squares_.size());
+      if (i < spans_) add_squares(hessian_[static_cast<std::size_t>(i)]);
+      most = std::max(most, limits_.stage_size(i) + M * K);
+    }
+    first_square_.push_back(squares_.size());
+    terms_.resize(static_cast<std::size_t>(most));
   }
 
   // UDUᵀ of a positive semidefinite matrix; what rounding leaves of a column that it lacks is
   // dropped.
-  static typename Recursion::Factor squares_of(LocalMatrix h) {
-    typename Recursion::Factor out;
+  void add_squares(LocalMatrix h) {
     const double least = 1e-14 * h.diagonal().maxCoeff();
     for (int j = M * K - 1; j >= 0; --j) {
       const double d = h(j, j);
       if (d <= least) continue;
-      out.d[j] = d;
-      out.u.col(j).head(j) = h.col(j).head(j) / d;
-      h.topLeftCorner(j, j).noalias() -=
-          d * out.u.col(j).head(j) * out.u.col(j).head(j).transpose();
+      Term square{d, j, Local::Unit(j)};
+      square.a.head(j) = h.col(j).head(j) / d;
+      h.topLeftCorner(j, j).noalias() -= d * square.a.head(j) * square.a.head(j).transpose();
+      squares_.push_back(square);
     }
-    return out;
   }
 
   void size_vectors() {
@@ -148,8 +153,8 @@ class InteriorPoint {
       set_limit(sides_[1], k, upper);
     }
     count_ = sides_[0].has.sum() + sides_[1].has.sum() + (qp_.relaxation ? 1.0 : 0.0);
-    g_ = dg_ = fix_g_ = border_g_ = border_weight_ = weight_ = linear_ = lambda_ = dlambda_ =
-        Array::Zero(n);
+    g_ = dg_ = fix_g_ = weight_ = linear_ = lambda_ = dlambda_ = Array::Zero(n);
+    if (qp_.relaxation) border_g_ = border_weight_ = Array::Zero(n);
   }
 
   static void set_limit(Side& side, Eigen::Index k, double limit) {
@@ -183,7 +188,7 @@ class InteriorPoint {
       linear_[equations_[e]] = (g_[equations_[e]] - target_[e]) / kDelta;
     }
     factor();
-    solve(true);
+    solve(Slope::at_path);
     path_.add(1.0, fix_);
     update();
     start_slacks();
@@ -271,7 +276,10 @@ class InteriorPoint {
   bool converged() {
     double primal = 0.0, multiplier = 0.0;
     for (Side& side : sides_) {
-      side.miss = side.has * (side.sign * (g_ - side.limit) + relax_ * tau_ - side.s);
+      if (qp_.relaxation)
+        side.miss = side.has * (side.sign * (g_ - side.limit) + relax_ * tau_ - side.s);
+      else
+        side.miss = side.has * (side.sign * (g_ - side.limit) - side.s);
       primal = std::max(primal, largest(side.miss));
       multiplier = std::max(multiplier, largest(side.z));
     }
@@ -292,34 +300,30 @@ class InteriorPoint {
   // ---- one linear system
 
   void set_weights() {
-    weight_.setZero();
-    for (Side& side : sides_) {
-      side.inverse = side.has / (side.s + kDelta * side.z);
-      weight_ += side.z * side.inverse;
-    }
+    for (Side& side : sides_) side.inverse = side.has / (side.s + kDelta * side.z);
+    weight_ = sides_[0].z * sides_[0].inverse + sides_[1].z * sides_[1].inverse;
     for (const Eigen::Index k : equations_) weight_[k] = 1.0 / kDelta;
   }
 
   void factor() {
     recursion_.factor(kProximal, [this](int i, typename Recursion::Factor& w) {
-      if (i < spans_) {
-        const auto& h = squares_[static_cast<std::size_t>(i)];
-        for (int j = M * K - 1; j >= 0; --j)
-          if (h.d[j] > 0.0) w.add(h.d[j], Local(h.u.col(j)), j);
-      }
-      limits_.grow(i, weight_, w);
+      const std::size_t at = static_cast<std::size_t>(i);
+      Term* end = std::copy(squares_.data() + first_square_[at],
+                            squares_.data() + first_square_[at + 1], terms_.data());
+      w.add(terms_.data(), limits_.terms(i, weight_, end));
     });
   }
 
+  enum class Slope { none, at_path, at_end };
   // fix_, fix_g_: least of the quadratic model with linear terms linear_ on the limited values and,
-  // if wanted, the slope of the objective at path_ + dpath_.
-  void solve(bool with_slope) {
+  // if wanted, the slope of the objective at path_ or at the end of the direction.
+  void solve(Slope slope) {
     Local end = Local::Zero();
     limits_.add_linear(spans_, linear_, end);
     const auto vector = [&](int i) {
       const std::size_t at = static_cast<std::size_t>(i);
-      Local w = Local::Zero();
-      if (with_slope) w.noalias() = slope_[at] + hessian_[at] * dpath_.y[at];
+      Local w = slope == Slope::none ? Local(Local::Zero()) : slope_[at];
+      if (slope == Slope::at_end) w.noalias() += hessian_[at] * dpath_.y[at];
       limits_.add_linear(i, linear_, w);
       return w;
     };
@@ -333,35 +337,43 @@ class InteriorPoint {
     dg_.setZero();
     dlambda_.setZero();
     dtau_ = 0.0;
+    no_direction_ = true;
     for (Side& side : sides_) side.dz.setZero();
   }
 
   // Brings the direction nearer to the solution of the Newton system. Returns what the
   // regularisation leaves of the limits.
   double correct() {
-    linear_ = lambda_ + dlambda_;
     double tau_right = 0.0;
     for (Side& side : sides_) {
-      side.error = -side.inverse * (side.product + side.s * side.dz +
-                                    side.z * (side.sign * dg_ + relax_ * dtau_ + side.miss));
-      linear_ -= side.sign * (side.z + side.dz + side.error);
+      if (qp_.relaxation)
+        side.error = -side.inverse * (side.product + side.s * side.dz +
+                                      side.z * (side.sign * dg_ + relax_ * dtau_ + side.miss));
+      else
+        side.error = -side.inverse *
+                     (side.product + side.s * side.dz + side.z * (side.sign * dg_ + side.miss));
       if (qp_.relaxation) tau_right += (relax_ * (side.z + side.dz + side.error)).sum();
     }
+    linear_ = lambda_ + dlambda_ - (sides_[0].z + sides_[0].dz + sides_[0].error) +
+              (sides_[1].z + sides_[1].dz + sides_[1].error);
     for (std::size_t e = 0; e < equations_.size(); ++e) {
       const Eigen::Index k = equations_[e];
       linear_[k] += (g_[k] + dg_[k] - target_[e]) / kDelta;
     }
-    solve(true);
+    solve(no_direction_ ? Slope::at_path : Slope::at_end);
+    no_direction_ = false;
     const double fix_tau = qp_.relaxation ? tau_step(tau_right) : 0.0;
     dpath_.add(1.0, fix_);
     dg_ += fix_g_;
     dtau_ += fix_tau;
     double left = 0.0;
     for (Side& side : sides_) {
-      const Array fix_z =
-          side.error - side.z * side.inverse * (side.sign * fix_g_ + relax_ * fix_tau);
-      side.dz += fix_z;
-      left = std::max(left, largest(fix_z));
+      if (qp_.relaxation)
+        side.error -= side.z * side.inverse * (side.sign * fix_g_ + relax_ * fix_tau);
+      else
+        side.error -= side.z * side.inverse * (side.sign * fix_g_);
+      side.dz += side.error;
+      left = std::max(left, largest(side.error));
     }
     for (std::size_t e = 0; e < equations_.size(); ++e) {
       const Eigen::Index k = equations_[e];
@@ -369,13 +381,18 @@ class InteriorPoint {
       dlambda_[k] += fix_lambda;
       left = std::max(left, std::abs(fix_lambda));
     }
-    finish_direction();
+    dtau_dual_ = qp_.relaxation ? -(tau_product_ + tau_dual_ * dtau_) / tau_slack_ : 0.0;
     return kDelta * left;
   }
 
+  // The steps of the slacks.
   void finish_direction() {
-    for (Side& side : sides_) side.ds = side.has * (side.sign * dg_ + relax_ * dtau_ + side.miss);
-    dtau_dual_ = qp_.relaxation ? -(tau_product_ + tau_dual_ * dtau_) / tau_slack_ : 0.0;
+    for (Side& side : sides_) {
+      if (qp_.relaxation)
+        side.ds = side.has * (side.sign * dg_ + relax_ * dtau_ + side.miss);
+      else
+        side.ds = side.has * (side.sign * dg_ + side.miss);
+    }
   }
 
   // The path by which all moves when τ grows by 1.
@@ -387,7 +404,7 @@ class InteriorPoint {
       border_own_ += (relax_.square() * side.z * side.inverse).sum();
     }
     linear_ = border_weight_;
-    solve(false);
+    solve(Slope::none);
     border_ = fix_;
     border_g_ = fix_g_;
   }
@@ -431,6 +448,7 @@ class InteriorPoint {
     tau_product_ = tau_slack_ * tau_dual_;
     if (count_ > 0.0) {
       correct();
+      finish_direction();
       const double after = mu_after(step_to_boundary());
       const double target = now * std::pow(std::max(0.0, after / now), 3);
       for (Side& side : sides_)
@@ -440,6 +458,7 @@ class InteriorPoint {
     const double enough = std::max(1e-3 * settings_.tolerance, kCorrected * now);
     for (int round = 0; round < kMostCorrections; ++round)
       if (correct() < enough) break;
+    finish_direction();
     if (!dg_.isFinite().all() || !std::isfinite(dtau_)) return false;
     const double reach = step_to_boundary();
     const double share =
@@ -505,7 +524,9 @@ class InteriorPoint {
   Limits limits_;
   int place_[M * K] = {};
   std::vector<LocalMatrix> hessian_;
-  std::vector<typename Recursion::Factor> squares_;
+  std::vector<Term> squares_;  ///< of all pieces, whose sum is the Hessian
+  std::vector<std::size_t> first_square_;
+  std::vector<Term> terms_;  ///< of one stage
   std::vector<Local> gradient_, slope_;
   std::vector<Eigen::Index> equations_;  ///< limits that are equations
   std::vector<double> target_;
@@ -513,6 +534,7 @@ class InteriorPoint {
   Array relax_, g_, dg_, fix_g_, border_g_, border_weight_, weight_, linear_;
   Array lambda_, dlambda_;  ///< of equations; 0 elsewhere
   Path path_, dpath_, fix_, border_;
+  bool no_direction_ = true;  ///< dpath_ is 0
   int hopeless_ = 0;
   double dual_left_ = 1.0;  ///< of the first gradient of the Lagrangian: every step takes its share
   double count_ = 0.0;      ///< of products s·z

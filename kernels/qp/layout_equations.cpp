@@ -120,21 +120,24 @@ LagrangianGradient lagrangian_gradient(const QuadraticProgram& qp, const QpSolut
           "the solution belongs to this programme");
   Eigen::VectorXd curvature = Eigen::VectorXd::Zero(layout.size());
   Eigen::VectorXd linear = Eigen::VectorXd::Zero(layout.size());
-  Eigen::VectorXd piece(local);
+  Eigen::VectorXd piece(local), product(local);
+  std::vector<int> first(static_cast<std::size_t>(local));  // the next piece's are one further
+  for (int p = 0; p < local; ++p) first[static_cast<std::size_t>(p)] = layout.local_index(0, p);
   for (int i = 0; i < layout.spans(); ++i) {
-    for (int p = 0; p < local; ++p) piece(p) = solution.x(layout.local_index(i, p));
-    const Eigen::VectorXd product = qp.hessian.middleCols(i * local, local) * piece;
+    for (int p = 0; p < local; ++p) piece(p) = solution.x(first[static_cast<std::size_t>(p)] + i);
+    product.noalias() = qp.hessian.middleCols(i * local, local) * piece;
     for (int p = 0; p < local; ++p) {
-      curvature(layout.local_index(i, p)) += product(p);
-      linear(layout.local_index(i, p)) += qp.gradient(p, i);
+      const int at = first[static_cast<std::size_t>(p)] + i;
+      curvature(at) += product(p);
+      linear(at) += qp.gradient(p, i);
     }
   }
   Eigen::VectorXd rows = Eigen::VectorXd::Zero(layout.size());
   for (int r = 0; r < qp.row_count(); ++r) {
     const double multiplier = solution.row_lower(r) - solution.row_upper(r);
-    for (int p = 0; p < local; ++p) {
-      rows(layout.local_index(qp.row_span[r], p)) += multiplier * qp.rows(p, r);
-    }
+    const int span = qp.row_span[static_cast<std::size_t>(r)];
+    for (int p = 0; p < local; ++p)
+      rows(first[static_cast<std::size_t>(p)] + span) += multiplier * qp.rows(p, r);
   }
   const Eigen::VectorXd bounds = solution.bound_lower - solution.bound_upper;
   return {curvature + linear - bounds - rows,

@@ -75,15 +75,22 @@ class PieceLimits {
     }
   }
 
-  /// Adds Σ weight_k · form · formᵀ over the limits of one stage.
-  void grow(int stage, const Array& weight, typename Recursion::Factor& factor) const {
-    for (int k = first(stage); k < first(stage + 1); ++k) {
+  int stage_size(int stage) const { return first(stage + 1) - first(stage); }
+
+  /// Puts weight_k · form · formᵀ of the limits of one stage behind each other.
+  /// @return behind the last one
+  typename Recursion::Factor::Term* terms(int stage, const Array& weight,
+                                          typename Recursion::Factor::Term* to) const {
+    for (int k = first(stage); k < first(stage + 1); ++k, ++to) {
       const Limited& limit = limits_[static_cast<std::size_t>(k)];
+      to->weight = weight[k];
+      to->last = limit.position >= 0 ? limit.position : M * K - 1;
       if (limit.position >= 0)
-        factor.add(weight[k], Local(Local::Unit(limit.position)), limit.position);
+        to->a = Local::Unit(limit.position);
       else
-        factor.add(weight[k], forms_[static_cast<std::size_t>(limit.form)], M * K - 1);
+        to->a = forms_[static_cast<std::size_t>(limit.form)];
     }
+    return to;
   }
 
  private:

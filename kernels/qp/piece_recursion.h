@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <cstddef>
 #include <vector>
 
 #include "kernels/qp/quadratic_program.h"
@@ -14,29 +15,49 @@ namespace smoothpost {
 /// as in a Cholesky factor, where the sum itself would keep those of the largest alone.
 template <int N>
 struct GrowingFactor {
+  using Vector = Eigen::Matrix<double, N, 1>;
   Eigen::Matrix<double, N, N> u = Eigen::Matrix<double, N, N>::Identity();
-  Eigen::Matrix<double, N, 1> d = Eigen::Matrix<double, N, 1>::Zero();
+  Vector d = Vector::Zero();
 
-  /// Adds weight·a·aᵀ, a zero behind `last`. Agee and Turner's update: no square roots; the weight
-  /// left for the columns before j is weight·d_j/(d_j + weight·a_j²).   @pre weight ≥ 0
-  template <class Vector>
-  void add(double weight, Vector a, int last) {
-    for (int j = last; j >= 0 && weight > 0.0; --j) {
-      const double p = a[j];
-      if (p == 0.0) continue;
-      const double share = weight * p;
-      const double grown = d[j] + share * p;
-      if (grown == 0.0) continue;
+  /// weight·a·aᵀ, a zero behind `last`.
+  struct Term {
+    double weight = 0.0;  ///< ≥ 0
+    std::ptrdiff_t last = N - 1;
+    Vector a;
+  };
+
+  /// Adds terms, which are used up. Agee and Turner's update: no square roots; the weight left for
+  /// the columns before j is weight·d_j/(d_j + weight·a_j²). All terms go through a column before
+  /// any goes on to the next: as one after the other to the bit, but a term's divisions do not wait
+  /// for those of the one before.
+  void add(Term* first, Term* end) { add_columns<N - 1>(first, end); }
+
+ private:
+  template <int J>
+  void add_columns(Term* first, Term* end) {
+    double* column = &u(0, J);
+    double dj = d[J];
+    double uj[J + 1];
+    for (int i = 0; i < J; ++i) uj[i] = column[i];
+    for (Term* term = first; term != end; ++term) {
+      if (term->last < J) continue;
+      double* a = term->a.data();
+      const double p = a[J];
+      const double share = term->weight * p;
+      const double grown = dj + share * p;
+      if (p == 0.0 || !(term->weight > 0.0) || grown == 0.0) continue;
       const double inverse = 1.0 / grown;
       const double b = share * inverse;
-      weight *= d[j] * inverse;
-      d[j] = grown;
-      double* column = &u(0, j);
-      for (int i = 0; i < j; ++i) {
-        a[i] -= p * column[i];
-        column[i] += b * a[i];
+      term->weight *= dj * inverse;
+      dj = grown;
+      for (int i = 0; i < J; ++i) {
+        a[i] -= p * uj[i];
+        uj[i] += b * a[i];
       }
     }
+    for (int i = 0; i < J; ++i) column[i] = uj[i];
+    d[J] = dj;
+    if constexpr (J > 0) add_columns<J - 1>(first, end);
   }
 };
 

@@ -76,13 +76,16 @@ struct QpFeasibility {
   int channel = 0;         ///< of that bound
   int level = 0;           ///< of that bound: 0 position, 1 velocity, 2 acceleration, 3 jerk
   double place = 0.0;      ///< u of it
-  QpSolution solution;     ///< at the least τ: strictly inside when feasible with room
+  /// At the least τ: strictly inside when feasible with room. Its certificate is that of the
+  /// elastic programme in the units in which it was solved.
+  QpSolution solution;
 };
 
 /// Decides feasibility by the elastic form: least τ with every row and bound that is no equation
 /// relaxed by τ (row_weight, bound_weight of qp.relaxation, or 1). Always by the banded solver.
-/// @pre well scaled: nothing is scaled inside. Where levels or rows are in units that differ by 1e6
-/// the answer may be wrong (36 of 60 programmes rescaled at random differed).
+/// Levels and rows may be in any units: the programme is solved in units in which its limits are of
+/// the order of 1 (equilibrate.h). Weights that are not given are 1 in those units, which are the
+/// given ones as far as these are within 32 times of them.
 QpFeasibility feasibility(const QuadraticProgram& qp, const QpSettings& settings = {});
 
 }  // namespace smoothpost

@@ -15,8 +15,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-int level_start(int controls, int level) { return level * controls - level * (level - 1) / 2; }
-
 /// Weights of one channel's local variables become those of the scaled ones.
 void scale_row(const SplineLayout& layout, int channel, BasisRow& row) {
   for (int q = 0; q < row.weights.size(); ++q)
@@ -36,26 +34,26 @@ Eigen::MatrixXd piece_cost(const SplineLayout& layout, int channel, int span, in
   return cost;
 }
 
-Eigen::VectorXd local_of(const SplineLayout& layout, const Eigen::VectorXd& x, int span) {
-  Eigen::VectorXd local(layout.local_size());
-  for (int p = 0; p < local.size(); ++p) local[p] = x[layout.local_index(span, p)];
-  return local;
-}
+/// The local variables of one piece after the other, in one place.
+class LocalVariables {
+ public:
+  LocalVariables(const SplineLayout& layout, const Eigen::VectorXd& x)
+      : x_(x), local_(layout.local_size()) {
+    for (int p = 0; p < local_.size(); ++p) first_.push_back(layout.local_index(0, p));
+  }
+  const Eigen::VectorXd& at(int span) {
+    for (std::size_t p = 0; p < first_.size(); ++p)
+      local_[static_cast<Eigen::Index>(p)] = x_[first_[p] + span];
+    return local_;
+  }
+
+ private:
+  const Eigen::VectorXd& x_;
+  Eigen::VectorXd local_;
+  std::vector<int> first_;  ///< of the first piece; every other one is one further
+};
 
 }  // namespace
-
-int SplineLayout::channel_size() const { return level_start(controls(), levels + 1); }
-
-int SplineLayout::index(int channel, int level, int j) const {
-  return channel * channel_size() + level_start(controls(), level) + j;
-}
-
-int SplineLayout::local_index(int span, int p) const {
-  const int channel = p / (knots.degree + 1);
-  const int q = p % (knots.degree + 1);
-  const int level = std::min(q, levels);
-  return index(channel, level, span + q - level);
-}
 
 double SplineLayout::place(int level, int j) const {
   const int k = knots.degree;
@@ -174,10 +172,12 @@ double objective_value(const QuadraticProgram& qp, const Eigen::VectorXd& x) {
   require(x.size() == qp.layout.size(), "objective_value: one value a variable");
   const int local = qp.layout.local_size();
   double sum = qp.constant;
+  LocalVariables variables(qp.layout, x);
+  Eigen::VectorXd slope(local);
   for (int span = 0; span < qp.layout.spans(); ++span) {
-    const Eigen::VectorXd here = local_of(qp.layout, x, span);
-    sum += 0.5 * here.dot(qp.hessian.middleCols(span * local, local) * here) +
-           qp.gradient.col(span).dot(here);
+    const Eigen::VectorXd& here = variables.at(span);
+    slope.noalias() = qp.hessian.middleCols(span * local, local) * here;
+    sum += 0.5 * here.dot(slope) + qp.gradient.col(span).dot(here);
   }
   return sum;
 }
@@ -185,8 +185,9 @@ double objective_value(const QuadraticProgram& qp, const Eigen::VectorXd& x) {
 Eigen::VectorXd row_values(const QuadraticProgram& qp, const Eigen::VectorXd& x) {
   require(x.size() == qp.layout.size(), "row_values: one value a variable");
   Eigen::VectorXd values(qp.row_count());
+  LocalVariables variables(qp.layout, x);
   for (int i = 0; i < qp.row_count(); ++i)
-    values[i] = qp.rows.col(i).dot(local_of(qp.layout, x, qp.row_span[i]));
+    values[i] = qp.rows.col(i).dot(variables.at(qp.row_span[static_cast<std::size_t>(i)]));
   return values;
 }
 

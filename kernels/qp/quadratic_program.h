@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -27,15 +28,24 @@ struct SplineLayout {
   int count(int level) const { return controls() - level; }
   /// Of all variables: channel by channel, level by level.
   int size() const { return channels * channel_size(); }
-  int channel_size() const;
-  int index(int channel, int level, int j) const;
+  int channel_size() const { return level_start(levels + 1); }
+  int index(int channel, int level, int j) const {
+    return channel * channel_size() + level_start(level) + j;
+  }
   /// Variables that determine one piece: channels × (degree + 1), channel by channel, each in the
   /// order of lifted_basis().
   int local_size() const { return channels * (knots.degree + 1); }
   /// Index of local variable p of piece `span`.
-  int local_index(int span, int p) const;
+  int local_index(int span, int p) const {
+    const int channel = p / (knots.degree + 1), q = p % (knots.degree + 1);
+    const int level = std::min(q, levels);
+    return index(channel, level, span + q - level);
+  }
   /// Where the variable acts: the mean of the knots that its control point hangs on (Greville).
   double place(int level, int j) const;
+
+ private:
+  int level_start(int level) const { return level * controls() - level * (level - 1) / 2; }
 };
 
 /// The layout with scale 1.   @pre knots clamped with simple inner knots, 1 ≤ levels ≤ degree

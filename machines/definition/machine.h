@@ -127,6 +127,7 @@ struct RecipeSettings {
   std::string solver = "hybrid";
   std::string schedule = "jerk";  ///< jerk | constant | programmed
   int knot_every = 4;
+  int alternations = 2;  ///< passes of the shape under its own schedule; 0: none
   /// mm along each cut, ascending, of the via points of orientation "via"; empty: found from the
   /// path
   std::vector<double> via;

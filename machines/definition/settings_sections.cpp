@@ -251,6 +251,7 @@ RecipeSettings read_recipe(TableReader reader) {
   choose("solver", {"hybrid", "ipopt", "banded"}, recipe.solver);
   choose("schedule", {"jerk", "constant", "programmed"}, recipe.schedule);
   recipe.knot_every = reader.integer("knot_every", 1, 64).value_or(recipe.knot_every);
+  recipe.alternations = reader.integer("alternations", 0, 8).value_or(recipe.alternations);
   recipe.via = read_via(reader);
   const auto share = [&](std::string_view key, double fallback) {
     const double value = reader.number_or(key, fallback, Bound::not_negative);

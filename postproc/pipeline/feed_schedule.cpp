@@ -63,10 +63,8 @@ class Scheduler {
         machine_(input.path.machine),
         samples_(input.path.plan.samples),
         limits_(feed_limits(input.path.machine)),
-        progress_(progress) {
-    const double shortest = limits_.acceleration.cwiseQuotient(limits_.jerk).minCoeff();
-    element_time_ = std::clamp(kElementShare * shortest, kShortestElement, kLongestElement);
-  }
+        settings_(feed_settings(input.path.machine)),
+        progress_(progress) {}
 
   Result<FeedSchedule> run() {
     FeedSchedule out;
@@ -145,11 +143,8 @@ class Scheduler {
     if (!(stretch.joints.length() > 0.0)) return;
     std::vector<RateCap> caps;
     FeedResult result;
-    FeedSettings settings;
-    settings.element_time = element_time_;
-    settings.smooth_share = 1.0;  // joint_stretches() has looked at that
     for (int round = 0; round <= kBlockRounds; ++round) {
-      result = schedule_feed(feed_path(stretch.joints, caps), limits_, {}, {}, settings, progress);
+      result = schedule_feed(feed_path(stretch.joints, caps), limits_, {}, {}, settings_, progress);
       if (result.status != FeedStatus::solved && result.status != FeedStatus::constant_map) break;
       const std::vector<RateCap> more = short_blocks(stretch.joints, result.profile);
       if (more.empty() || round == kBlockRounds) break;
@@ -430,7 +425,7 @@ class Scheduler {
   const MachineDefinition& machine_;
   const std::vector<JointSample>& samples_;
   FeedLimits limits_;
-  double element_time_ = 0.0;
+  FeedSettings settings_;
   const Progress& progress_;
   Diagnostics problems_;
 };
@@ -504,6 +499,15 @@ FeedLimits feed_limits(const MachineDefinition& machine) {
     if (machine.axes[static_cast<std::size_t>(j)].source == LimitSource::assumed)
       out.velocity[j] *= kAssumedShare;
   return out;
+}
+
+FeedSettings feed_settings(const MachineDefinition& machine) {
+  const FeedLimits limits = feed_limits(machine);
+  const double shortest = limits.acceleration.cwiseQuotient(limits.jerk).minCoeff();
+  FeedSettings settings;
+  settings.element_time = std::clamp(kElementShare * shortest, kShortestElement, kLongestElement);
+  settings.smooth_share = 1.0;  // joint_stretches() has looked at that
+  return settings;
 }
 
 Result<FeedSchedule> schedule_plan(const ScheduleInput& input, const Progress& progress) {

@@ -84,5 +84,7 @@ Diagnostics schedule_notes(const FeedSchedule& schedule, const MachineDefinition
 
 /// What joints and tip may do on a machine, as the schedule takes it.
 FeedLimits feed_limits(const MachineDefinition& machine);
+/// How finely: elements by the time that a joint takes to its largest acceleration.
+FeedSettings feed_settings(const MachineDefinition& machine);
 
 }  // namespace smoothpost

@@ -59,7 +59,7 @@ std::vector<PlannedStretch> all_planned(const StretchesInput& input) {
   std::vector<PlannedStretch> all;
   if (input.planned) all = *input.planned;
   for (const LaserPlanPath& from : input.laser) {
-    PlannedStretch to{std::make_shared<LaserPlanned>(from.path), from.first_sample, {}};
+    PlannedStretch to{planned_path(from.path), from.first_sample, {}};
     for (const double u : from.u) to.s.push_back(from.path.length_at(u));
     all.push_back(std::move(to));
   }
@@ -518,6 +518,10 @@ PathJet JointStretch::jet(std::size_t piece, double s) const {
 
 std::vector<JointStretch> joint_stretches(const StretchesInput& input) {
   return StretchBuilder(input).run();
+}
+
+std::shared_ptr<const PlannedPath> planned_path(LaserJointPath path) {
+  return std::make_shared<LaserPlanned>(std::move(path));
 }
 
 }  // namespace smoothpost

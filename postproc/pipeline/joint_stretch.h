@@ -68,4 +68,7 @@ struct StretchesInput {
 /// Cost: about ten solutions of the inverse a piece, linear in the legs.
 std::vector<JointStretch> joint_stretches(const StretchesInput& input);
 
+/// A laser's path over s.
+std::shared_ptr<const PlannedPath> planned_path(LaserJointPath path);
+
 }  // namespace smoothpost

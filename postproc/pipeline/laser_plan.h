@@ -23,18 +23,24 @@ struct QpReport {
   double violation = 0.0;
 };
 
-/// Peaks of one joint over a planned stretch, from its spline; mm or rad and s.
+/// Peaks of one joint over what is scheduled; mm or rad and s.
 struct JointPeaks {
   double velocity = 0.0, acceleration = 0.0, jerk = 0.0;
   double jerk_square_integral = 0.0;                                      ///< ∫ jerk² dt
   std::uint32_t velocity_line = 0, acceleration_line = 0, jerk_line = 0;  ///< of the input
 };
 
+/// What its own schedule made of a stretch's shape (reshape()).
+struct AlternationReport {
+  int tried = 0, kept = 0;                     ///< passes
+  double time_before = 0.0, time_after = 0.0;  ///< s, rest to rest by the schedule; 0: not tried
+};
+
 /// A stretch of a cut at constant feed that was optimised as one.
 struct LaserStretch {
   std::uint32_t first = 0, last = 0;  ///< segments of the input
   double length = 0.0;                ///< mm, of the tip
-  double feed = 0.0;                  ///< mm/s, constant
+  double feed = 0.0;                  ///< mm/s, constant, of the shape before any alternation
   double programmed_feed = 0.0;       ///< mm/s, the least on the stretch
   std::string slowed_by;              ///< what keeps the feed below the programmed one; empty
   std::vector<std::uint32_t> slowed_lines;
@@ -42,9 +48,9 @@ struct LaserStretch {
   int via_points = 0;
   int passes = 0;  ///< convex passes of the rotaries
   std::vector<QpReport> qp;
-  std::vector<JointPeaks> peaks;  ///< in joint order
   bool normal_from_part = false;
   ClearanceLoopReport clear;
+  AlternationReport alternation;
 };
 
 /// The joints of a planned stretch between the samples that stand for it in a LaserPlan.
@@ -82,7 +88,9 @@ struct LaserPlanInput {
 /// orientation windows (optimise_rotaries) at the largest constant feed that every joint's limits
 /// allow, the standoff by minimum jerk of the linear axes (optimise_standoff), then joint samples
 /// whose straight connection stays inside the chord share. With a scene each stretch is then kept
-/// clear (keep_clear); recipe.orientation "graph" takes the way of plan_by_graph() at once.
+/// clear (keep_clear); recipe.orientation "graph" takes the way of plan_by_graph() at once. With
+/// recipe.schedule = "jerk" it is then shaped anew under the law of its own schedule, up to
+/// recipe.alternations times (StretchPlanner::alternate).
 ///
 /// `base` are the joints of the programmed path: branches, turns and everything outside of the
 /// stretches are theirs. Where a stretch does not start or end its cut its joints are those of

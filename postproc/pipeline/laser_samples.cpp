@@ -7,7 +7,6 @@ namespace smoothpost {
 
 namespace {
 
-constexpr int kMeasures = 8;         // places a piece where peaks are looked for
 constexpr double kUsed = 0.8;        // of the chord share: it is looked at in quarters alone
 constexpr double kSamePlace = 1e-9;  // of u
 
@@ -67,29 +66,6 @@ LaserSamples sample_path(const LaserSampling& in, double rate) {
   for (std::size_t i = 1; i < out.samples.size(); ++i)
     out.samples[i].time = (out.u[i] - out.u[i - 1]) / out.rate;
   return out;
-}
-
-std::vector<JointPeaks> peaks_of(const LaserJointPath& path, const StretchPath& places,
-                                 double rate) {
-  const int steps = kMeasures * path.rotary.knots.spans();
-  const double du = (path.last() - path.first()) / steps;
-  std::vector<JointPeaks> peaks(static_cast<std::size_t>(path.held.size()));
-  for (int k = 0; k <= steps; ++k) {
-    const double u = k == steps ? path.last() : path.first() + k * du;
-    const std::uint32_t line = places.line(std::min(places.length(), path.length_at(u)));
-    const JointJet jet = path.jet(u);
-    for (std::size_t joint = 0; joint < peaks.size(); ++joint) {
-      JointPeaks& p = peaks[joint];
-      const auto row = static_cast<Eigen::Index>(joint);
-      const double v = std::abs(jet(row, 1)) * rate, a = std::abs(jet(row, 2)) * rate * rate,
-                   j = std::abs(jet(row, 3)) * rate * rate * rate;
-      if (v > p.velocity) p.velocity = v, p.velocity_line = line;
-      if (a > p.acceleration) p.acceleration = a, p.acceleration_line = line;
-      if (j > p.jerk) p.jerk = j, p.jerk_line = line;
-      p.jerk_square_integral += (k == 0 || k == steps ? 0.5 : 1.0) * j * j * du / rate;
-    }
-  }
-  return peaks;
 }
 
 }  // namespace smoothpost

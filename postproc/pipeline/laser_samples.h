@@ -34,8 +34,4 @@ struct LaserSamples {
 /// slower when one would be shorter than cycle.min_block.   Cost: about 10 µs a block.
 LaserSamples sample_path(const LaserSampling& input, double rate);
 
-/// Peaks of every joint at du/dt = rate, looked for at 8 places a piece; lines by `places`.
-std::vector<JointPeaks> peaks_of(const LaserJointPath& path, const StretchPath& places,
-                                 double rate);
-
 }  // namespace smoothpost

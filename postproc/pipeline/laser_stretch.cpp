@@ -91,6 +91,7 @@ Result<PlannedLaserStretch> StretchPlanner::run() {
   if (auto problem = solve_any()) return Failure::failure(*problem);
   PlannedLaserStretch out;
   if (auto problem = stay_clear(out)) return Failure::failure(*problem);
+  if (may_alternate(out)) alternate(out);
   sample(out);
   report_.first = in_.range.first;
   report_.last = in_.range.last;
@@ -99,7 +100,6 @@ Result<PlannedLaserStretch> StretchPlanner::run() {
   report_.programmed_feed = path_.feed();
   report_.control_points = out.path.rotary.knots.controls();
   report_.normal_from_part = in_.frames.from_part();
-  report_.peaks = peaks_of(out.path, path_, rate_of(feed_));
   out.report = std::move(report_);
   return Failure(std::move(out));
 }
@@ -291,8 +291,11 @@ RotaryProblem StretchPlanner::rotary_problem() const {
     const AxisDefinition& axis = machine_.axes[static_cast<std::size_t>(p.joints[c])];
     p.lower[c] = axis.joint.lower;
     p.upper[c] = axis.joint.upper;
-    p.limits[c] = limits_by_parameter(axis, machine_.tolerance.limit_share, rate_of(feed_));
+    p.limits[c] =
+        limits_by_parameter(axis, machine_.tolerance.limit_share, law_ ? 1.0 : rate_of(feed_));
   }
+  p.law = law_;
+  p.rest_at_ends = !law_;  // the law has the rest
   const std::string& mode = machine_.recipe.orientation;
   p.monotone = mode == "monotone";
   if (mode == "via" || mode == "monotone") {
@@ -415,6 +418,9 @@ SplineCurve StretchPlanner::held_standoff() const {
 
 StandoffOptions StretchPlanner::standoff_options(double rate) const {
   StandoffOptions o;
+  o.law = law_;
+  o.rest_at_ends = !law_;
+  if (law_) rate = 1.0;
   const double share = machine_.tolerance.limit_share;
   const AxisDefinition& axis = machine_.axes[static_cast<std::size_t>(head_.standoff)];
   const double reserve =
@@ -523,7 +529,8 @@ std::optional<Diagnostic> StretchPlanner::settle() {
 }
 
 std::optional<Diagnostic> StretchPlanner::finish(RotaryResult rotaries) {
-  if (settings_.hybrid) rotaries = polish_rotaries(std::move(rotaries), settings_);
+  if (settings_.hybrid)
+    rotaries = polish_rotaries(rotary_problem(), std::move(rotaries), settings_);
   if (rotaries.status != RotaryStatus::optimal) return broke("rotary", rotaries.solution);
   rotary_ = rotaries.q;
   report_.passes = rotaries.passes;

@@ -84,6 +84,14 @@ class StretchPlanner {
   ClearanceTask clearance_task() const;
   LoopPlanner loop_planner();
   std::optional<Diagnostic> stay_clear(PlannedLaserStretch& out);
+  struct Shape;
+  bool may_alternate(const PlannedLaserStretch& out) const;
+  void alternate(PlannedLaserStretch& out);
+  std::optional<Shape> reshaped() const;
+  bool polish(Shape& shape) const;
+  bool complete(Shape& shape, const StandoffOptions& options) const;
+  bool schedule(Shape& shape, bool if_slowed) const;
+  bool may_take(const LaserJointPath& path) const;
   Diagnostic not_smooth() const;
   Diagnostic no_orientation(const QpFeasibility& why) const;
   Diagnostic too_fast(double factor) const;
@@ -111,6 +119,7 @@ class StretchPlanner {
   SplineCurve rotary_, standoff_;
   std::optional<SplineCurve> near_;   ///< rotaries that were found before, to start from
   std::optional<RotaryResult> here_;  ///< of optimise_rotaries() at feed_, where it is known
+  std::optional<PathLaw> law_;        ///< of the schedule under which the shape is made anew
   double feed_ = 0.0;                 ///< mm/s
   ClearanceConditions conditions_;
   LaserStretch report_;

@@ -114,6 +114,7 @@ void add_stretches(const CutSummary& cut, const std::vector<LaserStretch>& stret
   bool from_part = true;
   double feed = 0.0;
   Json qp = Json::array();
+  AlternationReport alternation;
   const auto begin =
       std::lower_bound(stretches.begin(), stretches.end(), cut.first,
                        [](const LaserStretch& s, std::uint32_t k) { return s.first < k; });
@@ -125,6 +126,10 @@ void add_stretches(const CutSummary& cut, const std::vector<LaserStretch>& stret
     passes += s.passes;
     from_part = from_part && s.normal_from_part;
     for (const QpReport& q : s.qp) qp.push_back(qp_json(q));
+    alternation.tried += s.alternation.tried;
+    alternation.kept += s.alternation.kept;
+    alternation.time_before += s.alternation.time_before;
+    alternation.time_after += s.alternation.time_after;
   }
   if (count == 0) return;
   j["stretches"] = count;
@@ -134,6 +139,11 @@ void add_stretches(const CutSummary& cut, const std::vector<LaserStretch>& stret
   j["normal"] = from_part ? "part" : "programmed";
   j["feed_mm_per_min"] = number(kSecondsPerMinute * feed);
   j["qp"] = std::move(qp);
+  if (alternation.tried > 0)
+    j["alternation"] = {{"tried", alternation.tried},
+                        {"kept", alternation.kept},
+                        {"time_before_s", number(alternation.time_before)},
+                        {"time_after_s", number(alternation.time_after)}};
 }
 
 /// How the cut was kept clear of what is beside it; nothing where nothing was in the way.

@@ -520,6 +520,73 @@ TEST_CASE("standoff: jerk of the linears of Case 2", "[kernels][optimise][paper]
   }
 }
 
+TEST_CASE("standoff: a constant law is the constant feed", "[kernels][optimise]") {
+  Random random(31);
+  for (int n = 0; n < 4; ++n) {
+    const Stretch stretch = random_stretch(random, 20);
+    const double rate = 50.0;
+    StandoffOptions by_u = table_limits(rate, 5.0);
+    by_u.standoff = {};
+    by_u.linear.fill({});
+    const StandoffResult plain = optimise_standoff(stretch.head, stretch.tip, stretch.rotary, by_u);
+    StandoffOptions by_time = by_u;
+    by_time.law = PathLaw{20.0 / rate, [rate](double) { return PathSpeed{rate, 0.0, 0.0}; }};
+    const StandoffResult timed =
+        optimise_standoff(stretch.head, stretch.tip, stretch.rotary, by_time);
+    INFO(told(plain) << "\n" << told(timed));
+    REQUIRE(plain.solution.status == QpStatus::optimal);
+    REQUIRE(timed.solution.status == QpStatus::optimal);
+    const double fifth = std::pow(rate, 5);
+    CHECK(timed.jerk_before == Approx(plain.jerk_before * fifth));
+    CHECK(timed.jerk_after == Approx(plain.jerk_after * fifth));
+    for (int i = 0; i <= 40; ++i)
+      CHECK(timed.q6.at(0.5 * i)[0] == Approx(plain.q6.at(0.5 * i)[0]).margin(1e-3));
+  }
+}
+
+TEST_CASE("standoff: smooth in the time of a law", "[kernels][optimise]") {
+  Random random(32);
+  int tested = 0;
+  for (int n = 0; n < 6; ++n) {
+    const Stretch stretch = random_stretch(random, 20);
+    StandoffOptions settings = table_limits(1.0, 5.0);
+    const double last = 20.0;
+    // from 30 to 70 pieces a second and back
+    const auto speed = [](double u) {
+      const double c = std::cos(0.3 * u), s = std::sin(0.3 * u);
+      const double v = 50.0 - 20.0 * c, dv = 6.0 * s, ddv = 1.8 * c;
+      return PathSpeed{v, v * dv, v * (dv * dv + v * ddv)};
+    };
+    double duration = 0.0;
+    for (int k = 0; k < 2000; ++k) duration += last / 2000 / speed(last * (k + 0.5) / 2000).first;
+    settings.law = PathLaw{duration, speed};
+    const StandoffResult timed =
+        optimise_standoff(stretch.head, stretch.tip, stretch.rotary, settings);
+    if (timed.solution.status != QpStatus::optimal) continue;
+    ++tested;
+    // Σ ∫ (q⃛)² dt from the definition
+    const auto integral = [&](const SplineCurve& q6) {
+      double sum = 0.0;
+      for (int k = 0; k < 4000; ++k) {
+        const double u = last * (k + 0.5) / 4000;
+        const PathSpeed p = speed(u);
+        const VectorJet q = stretch.joints(u, q6);
+        const Vec3 jerk = p.first * p.first * p.first * q.col(3) +
+                          3.0 * p.first * p.second * q.col(2) + p.third * q.col(1);
+        sum += last / 4000 / p.first * jerk.squaredNorm();
+      }
+      return sum;
+    };
+    CHECK(timed.jerk_after == Approx(integral(timed.q6)).epsilon(1e-3));
+    CHECK(timed.jerk_after <= timed.jerk_before);
+    const StandoffResult plain =
+        optimise_standoff(stretch.head, stretch.tip, stretch.rotary, table_limits(30.0, 5.0));
+    if (plain.solution.status == QpStatus::optimal)
+      CHECK(timed.jerk_after <= integral(plain.q6) * (1.0 + 1e-3));
+  }
+  CHECK(tested >= 3);
+}
+
 TEST_CASE("standoff: preconditions", "[kernels][optimise]") {
   Random random(86);
   const Stretch stretch = random_stretch(random, 10);

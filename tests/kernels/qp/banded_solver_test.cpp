@@ -159,8 +159,10 @@ TEST_CASE("banded_solver: random feasible programmes", "[kernels][qp]") {
   CHECK(check_random_programmes(11, 60, 100) > 60);  // rows are active, or they did not matter
 }
 
-TEST_CASE("banded_solver: 500 random feasible programmes", "[.slow][slow][kernels][qp]") {
+TEST_CASE("banded_solver: 1400 random feasible programmes", "[.slow][slow][kernels][qp]") {
   CHECK(check_random_programmes(101, 450, 150) > 450);
+  CHECK(check_random_programmes(102, 450, 150) > 450);
+  CHECK(check_random_programmes(104, 450, 150) > 450);
   CHECK(check_random_programmes(103, 50, 800) > 50);
 }
 

@@ -13,11 +13,46 @@ using test::known_programme;
 using test::KnownProgramme;
 using test::ProgrammeRandom;
 using test::via_programme;
+using test::with_shares;
 
 /// The row of the quintic's value at u within a range.
 NewRow range(const SplineLayout& layout, double u, double lower, double upper,
              std::string_view name) {
   return {local_row(layout, 0, u, 0), lower, upper, name, u};
+}
+
+/// The same programme with levels and rows in other units, 1e-6 to 1e6 times as large.
+QuadraticProgram in_other_units(QuadraticProgram qp, ProgrammeRandom& random) {
+  const SplineLayout& layout = qp.layout;
+  Eigen::VectorXd local = Eigen::VectorXd::Ones(layout.local_size());
+  for (int c = 0; c < layout.channels; ++c)
+    for (int level = 0; level <= layout.levels; ++level) {
+      const double unit = std::pow(10.0, random.between(-6.0, 6.0));  // x = unit·x'
+      qp.layout.scale(c, level) *= unit;
+      for (int j = 0; j < layout.count(level); ++j) {
+        const int k = layout.index(c, level, j);
+        qp.lower[k] /= unit;
+        qp.upper[k] /= unit;
+        qp.relaxation->bound_weight[k] /= unit;
+      }
+      for (int p = 0; p < local.size(); ++p)
+        if (layout.local_index(0, p) >= layout.index(c, level, 0) &&
+            layout.local_index(0, p) < layout.index(c, level, 0) + layout.count(level))
+          local[p] = unit;
+    }
+  const int size = layout.local_size();
+  for (int span = 0; span < layout.spans(); ++span)
+    qp.hessian.middleCols(span * size, size) =
+        (local.asDiagonal() * qp.hessian.middleCols(span * size, size) * local.asDiagonal()).eval();
+  qp.gradient = (local.asDiagonal() * qp.gradient).eval();
+  for (int r = 0; r < qp.row_count(); ++r) {
+    const double unit = std::pow(10.0, random.between(-6.0, 6.0));
+    qp.rows.col(r) = unit * qp.rows.col(r).cwiseProduct(local);
+    qp.row_lower[r] *= unit;
+    qp.row_upper[r] *= unit;
+    qp.relaxation->row_weight[r] *= unit;
+  }
+  return qp;
 }
 
 /// 0 to 1 from rest to rest (q' = q'' = 0) with that limit on the jerk's control points.
@@ -148,6 +183,52 @@ TEST_CASE("feasibility: strictly inside when there is room", "[kernels][qp]") {
     }
     CHECK(room == Approx(-answer.shortfall).margin(1e-6));
   }
+}
+
+TEST_CASE("feasibility: the same answer in any units", "[kernels][qp]") {
+  ProgrammeRandom random(22);
+  int infeasible = 0;
+  for (int n = 0; n < 60; ++n) {
+    const KnownProgramme known =
+        known_programme({n % 2 == 0 ? 5 : 3, 12 + random.below(60), 1 + n % 3}, random);
+    const QuadraticProgram qp = n % 3 == 2 ? with_shares(known.qp, random, 0.4) : known.qp;
+    QuadraticProgram weighted = qp;
+    weighted.relaxation =
+        Relaxation{Eigen::VectorXd::Ones(qp.layout.size()), Eigen::VectorXd::Ones(qp.row_count())};
+    for (Eigen::Index k = 0; k < qp.lower.size(); ++k)
+      if (qp.lower[k] == qp.upper[k]) weighted.relaxation->bound_weight[k] = 0.0;
+    for (Eigen::Index r = 0; r < qp.row_lower.size(); ++r)
+      if (qp.row_lower[r] == qp.row_upper[r]) weighted.relaxation->row_weight[r] = 0.0;
+    const QuadraticProgram other = in_other_units(weighted, random);
+    QuadraticProgram unweighted = other;
+    unweighted.relaxation.reset();
+    const QpFeasibility a = feasibility(weighted), b = feasibility(other);
+    INFO(n << " " << a.shortfall << " " << a.name << " / " << b.shortfall << " " << b.name);
+    CHECK(a.feasible == b.feasible);
+    CHECK(b.shortfall == Approx(a.shortfall).margin(1e-6));
+    CHECK(feasibility(unweighted).feasible == a.feasible);
+    infeasible += a.feasible ? 0 : 1;
+    // Back in the first units it is within every limit relaxed by τ.
+    Eigen::VectorXd x = b.solution.x;
+    for (int c = 0; c < qp.layout.channels; ++c)
+      for (int level = 0; level <= qp.layout.levels; ++level)
+        x.segment(qp.layout.index(c, level, 0), qp.layout.count(level)) *=
+            other.layout.scale(c, level) / qp.layout.scale(c, level);
+    const Relaxation& relaxed = *weighted.relaxation;
+    double outside = 0.0;
+    for (Eigen::Index k = 0; k < x.size(); ++k) {
+      const double way = relaxed.bound_weight[k] * b.shortfall;
+      outside = std::max({outside, qp.lower[k] - way - x[k], x[k] - way - qp.upper[k]});
+    }
+    const Eigen::VectorXd value = row_values(qp, x);
+    for (Eigen::Index r = 0; r < value.size(); ++r) {
+      const double way = relaxed.row_weight[r] * b.shortfall;
+      outside =
+          std::max({outside, qp.row_lower[r] - way - value[r], value[r] - way - qp.row_upper[r]});
+    }
+    CHECK(outside < 1e-6);
+  }
+  CHECK(infeasible >= 5);
 }
 
 TEST_CASE("feasibility: a second run gives equal bytes", "[kernels][qp]") {

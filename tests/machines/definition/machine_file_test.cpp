@@ -351,6 +351,7 @@ TEST_CASE("machine file: values out of their range", "[machines][definition]") {
   check_value(base_and("[cycle]\nlook_ahead_blocks = -1\n"), "MF108", "look_ahead_blocks = -1");
   check_value(base_and("[recipe]\nknot_every = 0\n"), "MF108", "knot_every = 0");
   check_value(base_and("[recipe]\nknot_every = 65\n"), "MF108", "knot_every = 65");
+  check_value(base_and("[recipe]\nalternations = 9\n"), "MF108", "alternations = 9");
   check_value(base_and("[recipe]\nvia_mm = [-1, 2]\n"), "MF108", "via_mm = [-1, 2]");
   check_value(base_and("[tolerance]\nexit_edge_mm = 0\n"), "MF108", "exit_edge_mm = 0");
   check_value(base_and("[links]\nclearance_mm = -1\n"), "MF108", "clearance_mm = -1");
