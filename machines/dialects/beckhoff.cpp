@@ -181,12 +181,7 @@ Result<EmittedProgram> emit(const MachineDefinition& machine, const MachineProgr
 
 Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
                            const std::string& file_name) {
-  auto parsed = gcode::parse(text, file_name, {250, true, true});
-  if (has_error(parsed.diagnostics))
-    return Result<ReadBack>::failure(std::move(parsed.diagnostics));
-  Reading reading(machine, file_name);
-  reading.run(parsed);
-  return finished(reading);
+  return read_with<Reading>(machine, file_name, gcode::parse(text, file_name, {250, true, true}));
 }
 
 const Dialect kDialect = {

@@ -35,6 +35,19 @@ std::string plain_text(std::string_view text, std::size_t length) {
   return out;
 }
 
+std::vector<std::string> remark_lines(std::string_view text, std::size_t width) {
+  std::vector<std::string> lines;
+  while (text.size() > width) {
+    const auto blank = text.rfind(' ', width);
+    const auto end = blank == std::string_view::npos || blank == 0 ? width : blank;
+    lines.emplace_back(text.substr(0, end));
+    text.remove_prefix(end);
+    while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
+  }
+  lines.emplace_back(text);
+  return lines;
+}
+
 std::optional<EventText> event_text(const MachineDefinition& machine, const MachineAction& action,
                                     Diagnostics& diagnostics) {
   EventText out;

@@ -29,6 +29,10 @@ std::optional<EventText> event_text(const MachineDefinition& machine, const Mach
 /// Printable ASCII of at most `length` characters: what any controller takes in a comment.
 std::string plain_text(std::string_view text, std::size_t length);
 
+/// `text` in pieces of at most `width` characters, parted at blanks where there are any: remarks of
+/// controllers with short lines. One empty piece for an empty text.
+std::vector<std::string> remark_lines(std::string_view text, std::size_t width);
+
 /// Finds the event that a statement of a program stands for, by the machine's rows.
 class EventReader {
  public:

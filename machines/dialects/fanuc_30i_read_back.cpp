@@ -309,13 +309,7 @@ class Reading : public gcode::GcodeReading {
 
 Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
                            const std::string& file_name) {
-  const gcode::Syntax syntax{250, false, true};
-  auto parsed = gcode::parse(text, file_name, syntax);
-  if (has_error(parsed.diagnostics))
-    return Result<ReadBack>::failure(std::move(parsed.diagnostics));
-  Reading reading(machine, file_name);
-  reading.run(parsed);
-  return finished(reading);
+  return read_with<Reading>(machine, file_name, gcode::parse(text, file_name, {250, false, true}));
 }
 
 }  // namespace smoothpost::fanuc_30i

@@ -94,15 +94,6 @@ class Emitter : public robot::RobotPrinter {
                std::to_string(kMostLines) + ". Write it in parts with --cuts");
   }
 
-  void warn(const char* code, std::uint32_t input_line, std::string text) {
-    Diagnostic d;
-    d.code = code;
-    d.severity = Severity::warning;
-    d.where.line = static_cast<int>(input_line);
-    d.text = std::move(text);
-    diagnostics().push_back(std::move(d));
-  }
-
   // ---- lines of /MN
 
   void numbered(const std::string& text) {
@@ -120,14 +111,7 @@ class Emitter : public robot::RobotPrinter {
   void comment(const std::string& text) override {
     std::string plain = plain_text(text, kMaxComment);
     std::replace(plain.begin(), plain.end(), ';', ',');
-    std::string_view rest = plain;
-    while (rest.size() > kMaxRemark) {
-      const auto blank = rest.rfind(' ', kMaxRemark);
-      const auto end = blank == std::string_view::npos || blank == 0 ? kMaxRemark : blank;
-      instruction("!" + std::string(rest.substr(0, end)));
-      rest = trimmed(rest.substr(end));
-    }
-    instruction("!" + std::string(rest));
+    for (const auto& remark : remark_lines(plain, kMaxRemark)) instruction("!" + remark);
   }
 
   void dwell(double seconds) override {
@@ -142,17 +126,7 @@ class Emitter : public robot::RobotPrinter {
   }
 
   void statement(const std::string& words, const MachineAction& action) override {
-    const auto row =
-        std::find_if(machine().process.events.begin(), machine().process.events.end(),
-                     [&](const EventWords& e) { return e.event == action.event.name; });
-    const std::size_t before = action.before;
-    const bool rounds =
-        before > 0 && before < program().moves.size() && has_blend(move(before - 1));
-    if (row != machine().process.events.end() && row->on_the_fly && rounds)
-      warn("PR222", action.input_line,
-           "event " + action.event.name + " (" + words.substr(0, 64) +
-               ") is to act on the fly and the robot stops for it: one output, such as DO[1]=ON, "
-               "can be set at a rounded corner");
+    warn_on_the_fly(words, action, "one output, such as DO[1]=ON, can be set at a rounded corner");
     instruction(words);
   }
 

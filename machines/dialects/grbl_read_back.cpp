@@ -143,12 +143,7 @@ Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
   const Firmware* firmware = firmware_of(machine.dialect.name);
   require(firmware != nullptr, "a dialect of the grbl family");
   const gcode::Syntax syntax{250, true, firmware->several_words};
-  auto parsed = gcode::parse(text, file_name, syntax);
-  if (has_error(parsed.diagnostics))
-    return Result<ReadBack>::failure(std::move(parsed.diagnostics));
-  Reading reading(machine, file_name, *firmware);
-  reading.run(parsed);
-  return finished(reading);
+  return read_with<Reading>(machine, file_name, gcode::parse(text, file_name, syntax), *firmware);
 }
 
 }  // namespace smoothpost::grbl

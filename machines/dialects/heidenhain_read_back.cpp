@@ -291,12 +291,7 @@ class Reading : public ProgramReading {
 
 Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
                            const std::string& file_name) {
-  auto parsed = parse(text, file_name);
-  if (has_error(parsed.diagnostics))
-    return Result<ReadBack>::failure(std::move(parsed.diagnostics));
-  Reading reading(machine, file_name);
-  reading.run(parsed);
-  return finished(reading);
+  return read_with<Reading>(machine, file_name, parse(text, file_name));
 }
 
 }  // namespace smoothpost::heidenhain

@@ -8,6 +8,7 @@
 #include "machines/dialects/event_text.h"
 #include "machines/dialects/krl.h"
 #include "machines/dialects/krl_line.h"
+#include "machines/dialects/program_reading.h"
 
 namespace smoothpost::krl {
 
@@ -434,14 +435,7 @@ class Reading {
 
 Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
                            const std::string& file_name) {
-  auto parsed = parse(text, file_name);
-  if (has_error(parsed.diagnostics))
-    return Result<ReadBack>::failure(std::move(parsed.diagnostics));
-  Reading reading(machine, file_name);
-  reading.run(parsed.program);
-  if (has_error(reading.diagnostics))
-    return Result<ReadBack>::failure(std::move(reading.diagnostics));
-  return Result<ReadBack>(std::move(reading.result), std::move(reading.diagnostics));
+  return read_with<Reading>(machine, file_name, parse(text, file_name));
 }
 
 }  // namespace smoothpost::krl

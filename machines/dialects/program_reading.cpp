@@ -134,10 +134,4 @@ bool ProgramReading::is_rotary(int j) const {
   return machine_.axes[static_cast<std::size_t>(j)].joint.kind == JointKind::rotary;
 }
 
-Result<ReadBack> finished(ProgramReading& reading) {
-  if (has_error(reading.diagnostics))
-    return Result<ReadBack>::failure(std::move(reading.diagnostics));
-  return Result<ReadBack>(std::move(reading.result), std::move(reading.diagnostics));
-}
-
 }  // namespace smoothpost

@@ -84,7 +84,24 @@ class ProgramReading {
   JointMask known_ = 0;
 };
 
-/// What a reading found, or its errors.
-Result<ReadBack> finished(ProgramReading& reading);
+/// What `Reading` makes of a text, or of what a parser made of it (with diagnostics, perhaps a
+/// program): its result or the errors. `more` goes to the reading's constructor.
+template <class Reading, class Source, class... More>
+Result<ReadBack> read_with(const MachineDefinition& machine, const std::string& file,
+                           Source&& source, const More&... more) {
+  if constexpr (requires { source.diagnostics; })
+    if (has_error(source.diagnostics))
+      return Result<ReadBack>::failure(std::move(source.diagnostics));
+  Reading reading(machine, file, more...);
+  if (!has_error(reading.diagnostics)) {
+    if constexpr (requires { source.program; })
+      reading.run(source.program);
+    else
+      reading.run(source);
+  }
+  if (has_error(reading.diagnostics))
+    return Result<ReadBack>::failure(std::move(reading.diagnostics));
+  return Result<ReadBack>(std::move(reading.result), std::move(reading.diagnostics));
+}
 
 }  // namespace smoothpost

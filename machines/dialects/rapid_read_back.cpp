@@ -7,6 +7,7 @@
 #include "kernels/core/units.h"
 #include "kernels/kinematics/screw_chain.h"
 #include "machines/dialects/event_text.h"
+#include "machines/dialects/program_reading.h"
 #include "machines/dialects/rapid.h"
 #include "machines/dialects/rapid_text.h"
 
@@ -466,14 +467,7 @@ class Reading {
 
 Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
                            const std::string& file_name) {
-  auto parsed = parse(text, file_name);
-  if (has_error(parsed.diagnostics))
-    return Result<ReadBack>::failure(std::move(parsed.diagnostics));
-  Reading reading(machine, file_name);
-  reading.run(parsed.program);
-  if (has_error(reading.diagnostics))
-    return Result<ReadBack>::failure(std::move(reading.diagnostics));
-  return Result<ReadBack>(std::move(reading.result), std::move(reading.diagnostics));
+  return read_with<Reading>(machine, file_name, parse(text, file_name));
 }
 
 }  // namespace smoothpost::rapid

@@ -23,15 +23,6 @@ std::string joint_text(const MachineDefinition& machine, int j, double value) {
   return decimal(value, machine.dialect.digits_length);
 }
 
-std::optional<SixR> arm_of(const MachineDefinition& machine, const RobotAxes& axes) {
-  if (!axes.has_arm()) return std::nullopt;
-  ScrewChain arm = chain_of(machine);
-  const auto joints = arm.joints;
-  arm.joints.clear();
-  for (const int j : axes.arm) arm.joints.push_back(joints[static_cast<std::size_t>(j)]);
-  return SixR::from(arm);
-}
-
 }  // namespace
 
 std::string decimal(double value, int decimals) {
@@ -56,6 +47,15 @@ RobotAxes robot_axes(const MachineDefinition& machine) {
       axes.unnamed.push_back(name);
   }
   return axes;
+}
+
+std::optional<SixR> arm_form(const MachineDefinition& machine, const RobotAxes& axes) {
+  if (!axes.has_arm()) return std::nullopt;
+  ScrewChain arm = chain_of(machine);
+  const auto joints = arm.joints;
+  arm.joints.clear();
+  for (const int j : axes.arm) arm.joints.push_back(joints[static_cast<std::size_t>(j)]);
+  return SixR::from(arm);
 }
 
 std::array<double, 4> printed_quaternion(const Mat3& rotation, int decimals) {
@@ -120,7 +120,7 @@ double printed_speed(double speed) {
 }
 
 ArmConfiguration::ArmConfiguration(const MachineDefinition& machine)
-    : axes_(robot_axes(machine)), arm_(arm_of(machine, axes_)) {}
+    : axes_(robot_axes(machine)), arm_(arm_form(machine, axes_)) {}
 
 std::array<int, 4> ArmConfiguration::at(const JointVector& joints) const {
   constexpr double kQuarter = 90.0;

@@ -25,6 +25,10 @@ struct RobotAxes {
 };
 RobotAxes robot_axes(const MachineDefinition& machine);
 
+/// The closed form of the six axes of the arm, whatever external axes there are; nothing when the
+/// machine has none or its arm is of another kind.
+std::optional<SixR> arm_form(const MachineDefinition& machine, const RobotAxes& axes);
+
 /// A unit quaternion, w first and not negative, rounded to `decimals` and normalised again.
 /// Guarantees (tests): length 1 within 1e-8 and the rotation within 1e-5 deg from 8 decimals on.
 std::array<double, 4> printed_quaternion(const Mat3& rotation, int decimals);

@@ -61,7 +61,20 @@ RobotPrinter::Leg RobotPrinter::leg(const Pose& from, const MachineMove& move) c
 
 void RobotPrinter::arrive(const MachineMove& move) {
   pose_ = pose_after(move);
+  joints_ = move.to;
   started_ = true;
+}
+
+double RobotPrinter::joint_percent(const MachineMove& move, int decimals) const {
+  constexpr double kMost = 99.99;
+  constexpr double kNoise = 1e-9;
+  const double scale = std::pow(10.0, decimals);
+  double needed = 0.0;
+  for (int j = 0; j < machine().size(); ++j) {
+    const double speed = std::abs(move.to[j] - joints_[j]) / move.duration;
+    needed = std::max(needed, speed / machine().axes[static_cast<std::size_t>(j)].velocity);
+  }
+  return std::clamp(std::floor(100.0 * needed * scale + kNoise) / scale, 1.0 / scale, kMost);
 }
 
 bool RobotPrinter::may_round(std::size_t i) const {
@@ -75,6 +88,31 @@ bool RobotPrinter::may_round(std::size_t i) const {
   for (std::size_t k = first; k < last; ++k)
     if (!is_taken(k) && program().actions[k].kind != MachineAction::Kind::comment) return false;
   return true;
+}
+
+void RobotPrinter::warn(const char* code, std::uint32_t input_line, std::string text) {
+  Diagnostic d;
+  d.code = code;
+  d.severity = Severity::warning;
+  d.where.line = static_cast<int>(input_line);
+  d.text = std::move(text);
+  diagnostics().push_back(std::move(d));
+}
+
+void RobotPrinter::warn_on_the_fly(const std::string& words, const MachineAction& action,
+                                   const char* reason) {
+  constexpr std::size_t kLongest = 64;
+  const auto& rows = machine().process.events;
+  const bool on_the_fly = std::any_of(rows.begin(), rows.end(), [&](const EventWords& e) {
+    return e.event == action.event.name && e.on_the_fly;
+  });
+  const std::size_t before = action.before;
+  if (!on_the_fly || before == 0 || before >= program().moves.size() ||
+      !has_blend(move(before - 1)))
+    return;
+  warn("PR222", action.input_line,
+       "event " + action.event.name + " (" + words.substr(0, kLongest) +
+           ") is to act on the fly and the robot stops for it: " + reason);
 }
 
 RobotReading::RobotReading(const MachineDefinition& machine, const std::string& file,
@@ -108,6 +146,15 @@ void RobotReading::set_tool(TextPlace at, const Pose& tool) {
               ": [tool] tip_mm, axis and flange of the machine file give another frame");
 }
 
+std::optional<double> RobotReading::seconds_at(double percent) const {
+  if (!stands_ || !all_known()) return std::nullopt;
+  double seconds = 0.0;
+  for (int j = 0; j < machine().size(); ++j)
+    seconds = std::max(seconds, std::abs(joints()[j] - (*stands_)[j]) /
+                                    machine().axes[static_cast<std::size_t>(j)].velocity);
+  return seconds * 100.0 / percent;
+}
+
 void RobotReading::add_joint_move(TextPlace at, std::optional<double> seconds) {
   if (has_ended()) error(at, "a motion stands behind the last lines of the machine file");
   ReadBackMove move = new_move(at);
@@ -116,6 +163,8 @@ void RobotReading::add_joint_move(TextPlace at, std::optional<double> seconds) {
   move.to = joints();
   move.known = known();
   pose_.reset();
+  stands_.reset();
+  if (all_known()) stands_ = joints();
   if (all_known() && has_frames()) {
     ScrewChain chain = chain_of(machine(), tool_length_);
     chain.workpiece_home = *result.part;
@@ -147,6 +196,7 @@ void RobotReading::add_line_move(TextPlace at, const Pose& tool, const LineSpeed
   for (const int j : axes_.external)
     if (j >= 0) move.to[j] = joints()[j];
   move.known = known();
+  stands_.reset();
   pose_ = tool;
   result.moves.push_back(std::move(move));
 }

@@ -37,11 +37,21 @@ class RobotPrinter : public ProgramPrinter {
   void arrive(const MachineMove& move);
   bool has_started() const { return started_; }
 
+  /// Share of the axes' speed (the machine file's) at which the slowest axis takes the planned time
+  /// from where the program stands, rounded down to `decimals` of a percent, in [least, 99.99]:
+  /// percent. For controls whose joint moves have no time.   @pre has_started()
+  double joint_percent(const MachineMove& move, int decimals) const;
+
   /// Whether the control may round the corner behind move i: a blend of the least radius or more
   /// was planned, a tool move follows, both have a length, and only comments and taken actions are
   /// between them.
   bool may_round(std::size_t i) const;
   bool has_blend(const MachineMove& move) const { return move.blend >= least_radius_; }
+
+  /// PR222, when `action` is to act on the fly and the corner where it stands would be rounded were
+  /// it not for it: the robot stops for it, because of `reason`.
+  void warn_on_the_fly(const std::string& words, const MachineAction& action, const char* reason);
+  void warn(const char* code, std::uint32_t input_line, std::string text);
 
  private:
   Pose pose_after(const MachineMove& move) const;
@@ -54,6 +64,7 @@ class RobotPrinter : public ProgramPrinter {
   ScrewChain chain_;
   bool started_ = false;
   Pose pose_ = Pose::Identity();
+  JointVector joints_;
 };
 
 class RobotReading : public ProgramReading {
@@ -63,6 +74,7 @@ class RobotReading : public ProgramReading {
                const char* frame_code);
 
   const rapid::RobotAxes& axes() const { return axes_; }
+  double tool_length() const { return tool_length_; }
 
   /// Frames that the text states; the same one again is no change. The tool may be longer or
   /// shorter than the machine file's along its axis, nothing else.
@@ -72,6 +84,10 @@ class RobotReading : public ProgramReading {
 
   /// A joint move to joints(), which set_joint() has set. Without seconds it is a rapid.
   void add_joint_move(TextPlace at, std::optional<double> seconds);
+
+  /// How long a joint move to joints() takes at that share of the axes' speed (the machine file's);
+  /// nothing when it is not known where it starts.
+  std::optional<double> seconds_at(double percent) const;
 
   /// How long a straight move takes: that many seconds, or the longer of way and turn. A rapid has
   /// neither.
@@ -90,6 +106,7 @@ class RobotReading : public ProgramReading {
   rapid::RobotAxes axes_;
   double tool_length_ = 0.0;
   std::optional<Pose> pose_;
+  std::optional<JointVector> stands_;  ///< the joints where the last joint move ended
 };
 
 }  // namespace smoothpost::robot

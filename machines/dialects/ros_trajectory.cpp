@@ -299,9 +299,7 @@ Result<EmittedProgram> emit(const MachineDefinition& machine, const MachineProgr
 
 Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
                            const std::string& file_name) {
-  Reading reading(machine, file_name);
-  reading.run(text);
-  return finished(reading);
+  return read_with<Reading>(machine, file_name, text);
 }
 
 namespace {

@@ -6,6 +6,7 @@
 #include "formats/siemens/mpf_reader.h"
 #include "kernels/core/units.h"
 #include "machines/dialects/event_text.h"
+#include "machines/dialects/program_reading.h"
 #include "machines/dialects/siemens_840d.h"
 
 namespace smoothpost::siemens_840d {
@@ -413,14 +414,7 @@ class Reading {
 
 Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
                            const std::string& file_name) {
-  auto parsed = siemens::parse_mpf(text, file_name);
-  if (has_error(parsed.diagnostics))
-    return Result<ReadBack>::failure(std::move(parsed.diagnostics));
-  Reading reading(machine, file_name);
-  reading.run(parsed.program);
-  if (has_error(reading.diagnostics))
-    return Result<ReadBack>::failure(std::move(reading.diagnostics));
-  return Result<ReadBack>(std::move(reading.result), std::move(reading.diagnostics));
+  return read_with<Reading>(machine, file_name, siemens::parse_mpf(text, file_name));
 }
 
 }  // namespace smoothpost::siemens_840d

@@ -97,25 +97,9 @@ class Emitter : public robot::RobotPrinter {
   void dwell(double seconds) override { statement_line("sleep(" + decimal_text(seconds, 4) + ")"); }
 
   void statement(const std::string& words, const MachineAction& action) override {
-    const bool on_the_fly = std::any_of(
-        machine().process.events.begin(), machine().process.events.end(),
-        [&](const EventWords& e) { return e.event == action.event.name && e.on_the_fly; });
-    if (on_the_fly && rounds_here(action.before)) {
-      Diagnostic d;
-      d.code = "PR222";
-      d.severity = Severity::warning;
-      d.where.line = static_cast<int>(action.input_line);
-      d.text = "event " + action.event.name + " (" + words.substr(0, 64) +
-               ") is to act on the fly and the robot stops for it: URScript runs a statement when "
-               "the motion in front of it has ended";
-      diagnostics().push_back(std::move(d));
-    }
+    warn_on_the_fly(words, action,
+                    "URScript runs a statement when the motion in front of it has ended");
     statement_line(words);
-  }
-
-  // A corner that would be rounded were it not for what stands there.
-  bool rounds_here(std::size_t before) const {
-    return before > 0 && before < program().moves.size() && has_blend(move(before - 1));
   }
 
   // ---- motions

@@ -301,9 +301,7 @@ class Reading : public robot::RobotReading {
 
 Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
                            const std::string& file_name) {
-  Reading reading(machine, file_name);
-  if (!has_error(reading.diagnostics)) reading.run(text);
-  return finished(reading);
+  return read_with<Reading>(machine, file_name, text);
 }
 
 }  // namespace smoothpost::urscript
