@@ -36,19 +36,17 @@ ScheduledPath scheduled_path(const LaserJointPath& shape, const StretchPath& pla
   return out;
 }
 
-/// Whether the law falls below the programmed feed between its ramps, or never reaches it.
+/// Whether the law slows down and speeds up again below the programmed feed, or never reaches it.
 bool is_slowed(const FeedPath& path, const FeedProfile& profile) {
-  int state = 0;  // 0 in the first ramp, 1 at the feed, 2 below it after that
+  double top = 0.0, low = 0.0;  // shares of the feed: the largest so far, the least since then
   for (std::size_t i = 0; i < path.feed.size(); ++i) {
     const double s = 0.5 * (path.breaks[i] + path.breaks[i + 1]);
-    const bool full = profile.at(profile.time(s)).first >= kFull * path.feed[i];
-    if (state == 2 && full) return true;
-    if (full)
-      state = 1;
-    else if (state == 1)
-      state = 2;
+    const double share = profile.at(profile.time(s)).first / path.feed[i];
+    if (low < kFull && share > low + (1.0 - kFull) && low < top) return true;
+    low = share > top ? share : std::min(low, share);
+    top = std::max(top, share);
   }
-  return state == 0;
+  return top < kFull;
 }
 
 PathLaw law_of(const LaserJointPath& path, const FeedProfile& profile) {
