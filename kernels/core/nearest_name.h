@@ -35,9 +35,13 @@ inline std::string nearest_name(std::string_view name, const std::vector<std::st
   return best;
 }
 
-/// ", did you mean X?" of nearest_name(), or nothing.
+/// ", did you mean X?" of nearest_name(), else of the first name that begins with `name` (3 letters
+/// at least), or nothing.
 inline std::string did_you_mean(std::string_view name, const std::vector<std::string>& names) {
-  const std::string guess = nearest_name(name, names);
+  std::string guess = nearest_name(name, names);
+  for (const std::string& candidate : names)
+    if (guess.empty() && name.size() >= 3 && candidate.substr(0, name.size()) == name)
+      guess = candidate;
   return guess.empty() ? std::string() : ", did you mean " + guess + "?";
 }
 

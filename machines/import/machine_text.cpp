@@ -28,10 +28,13 @@ std::string list(const Vec3& v) {
   return "[" + number(v.x()) + ", " + number(v.y()) + ", " + number(v.z()) + "]";
 }
 
+/// Printable ASCII: the file is valid UTF-8 whatever the source holds.
 std::string one_line(std::string_view text) {
   std::string out;
-  for (const char c : text.substr(0, 200))
-    out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
+  for (const char c : text.substr(0, 200)) {
+    const auto code = static_cast<unsigned char>(c);
+    out += code < 0x20 ? ' ' : code < 0x7f ? c : '?';
+  }
   return out;
 }
 
