@@ -50,7 +50,9 @@ struct CanonicalMotion {
   double duration = 0.0;  ///< s at the programmed feed; 0 for a rapid
   AxisWords start{};
   AxisWords end{};
-  Vec3 start_axis = Vec3::UnitZ();  ///< unit, tip to spindle, in W; zero: unknown
+  /// Unit, tip to spindle, in W. Zero: unknown; when the rotary words are known, the one that the
+  /// machine has at them (a great circle between positions of rotary axes).
+  Vec3 start_axis = Vec3::UnitZ();
   Vec3 end_axis = Vec3::UnitZ();
   ArcGeometry arc;
 };
