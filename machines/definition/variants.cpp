@@ -9,23 +9,31 @@ namespace smoothpost::machine_file {
 
 namespace {
 
-std::string usual_extension(const std::string& dialect) {
-  // a dialect, or the first part of the names of several
-  static constexpr std::array<std::pair<std::string_view, const char*>, 11> kRows = {
-      {{"beckhoff", "nc"},
-       {"fanuc_30i", "nc"},
-       {"fanuc_ls", "ls"},
-       {"grbl", "gcode"},
-       {"heidenhain", "h"},
-       {"krl", "src"},
-       {"linuxcnc", "ngc"},
-       {"rapid", "mod"},
-       {"ros", "yaml"},
-       {"siemens_840d", "mpf"},
-       {"urscript", "script"}}};
-  for (const auto& [name, extension] : kRows)
-    if (dialect.compare(0, name.size(), name) == 0) return extension;
-  return "txt";
+/// What files of a dialect are like when the machine file does not say it.
+struct UsualDialect {
+  std::string_view name;  ///< a dialect, or the first part of the names of several
+  const char* extension;
+  int most_length_digits = 9;  ///< decimals that its words can have
+  int most_angle_digits = 9;
+};
+
+UsualDialect usual_dialect(const std::string& dialect) {
+  static constexpr std::array<UsualDialect, 13> kRows = {{{"beckhoff", "nc"},
+                                                          {"fanuc_30i", "nc"},
+                                                          {"fanuc_ls", "ls"},
+                                                          {"grbl", "gcode"},
+                                                          {"heidenhain", "h", 4, 4},
+                                                          {"krl", "src"},
+                                                          {"linuxcnc", "ngc"},
+                                                          {"rapid", "mod"},
+                                                          {"ros", "yaml"},
+                                                          {"siemens_840d", "mpf"},
+                                                          {"urscript", "script"},
+                                                          {"val3", "pgx"},
+                                                          {"yaskawa_jbi", "jbi", 3, 2}}};
+  for (const auto& row : kRows)
+    if (dialect.compare(0, row.name.size(), row.name) == 0) return row;
+  return {"", "txt"};
 }
 
 TomlTable* table_of(TomlTable& root, const std::string& key) {
@@ -65,6 +73,20 @@ std::string dialect_name(TomlTable& root) {
   return name->value.string;
 }
 
+/// The key's number of digits, `usual` without it, is at most `most`.
+void limit_digits(TomlTable& dialect, const char* key, int usual, int most,
+                  const SourceLocation& where) {
+  const TomlEntry* there = dialect.find(key);
+  if (there != nullptr && there->value.kind != TomlKind::integer) return;
+  if ((there != nullptr ? there->value.integer : usual) <= most) return;
+  TomlEntry digits{key, where, {}};
+  digits.value.kind = TomlKind::integer;
+  digits.value.where = where;
+  digits.value.integer = most;
+  digits.value.real = most;
+  put(dialect, digits);
+}
+
 void leave_own_controller(TomlTable& root, const std::string& name, const SourceLocation& where) {
   if (TomlTable* process = table_of(root, "process")) remove(*process, "events");
   TomlTable* dialect = table_to_change(root, "dialect", where);
@@ -74,8 +96,12 @@ void leave_own_controller(TomlTable& root, const std::string& name, const Source
   TomlEntry extension{"extension", where, {}};
   extension.value.kind = TomlKind::string;
   extension.value.where = where;
-  extension.value.string = usual_extension(name);
+  const UsualDialect usual = usual_dialect(name);
+  extension.value.string = usual.extension;
   put(*dialect, extension);
+  limit_digits(*dialect, "digits_mm", 5, usual.most_length_digits, where);
+  limit_digits(*dialect, "digits_inch", 6, usual.most_length_digits, where);
+  limit_digits(*dialect, "digits_deg", 6, usual.most_angle_digits, where);
 }
 
 void lay_over(TomlTable& root, TomlTable& variant, const SourceLocation& where) {
@@ -102,6 +128,18 @@ void lay_over(TomlTable& root, TomlTable& variant, const SourceLocation& where) 
   words->value.where = taken.value.where;
   if (kept && taken.value.table.find("power") == nullptr) taken.value.table.add(*kept);
   put(root, taken);
+}
+
+/// The table of a dialect: the one of its name, or else the longest that its name begins with up to
+/// a _, so that [variant.grbl] is for grbl_marlin, too.
+TomlTable* variant_for(TomlTable* variants, std::string name) {
+  while (variants != nullptr) {
+    if (variants->find(name) != nullptr) return table_of(*variants, name);
+    const auto cut = name.rfind('_');
+    if (cut == std::string::npos) return nullptr;
+    name.resize(cut);
+  }
+  return nullptr;
 }
 
 /// The last override of dialect.name.
@@ -156,8 +194,7 @@ void choose_dialect(TomlTable& root, const std::vector<MachineOverride>& overrid
       const SourceLocation where{"--set dialect.name", 0, 0};
       leave_own_controller(root, name, where);
       variants = table_of(root, "variant");
-      if (TomlTable* variant = variants != nullptr ? table_of(*variants, name) : nullptr)
-        lay_over(root, *variant, where);
+      if (TomlTable* variant = variant_for(variants, name)) lay_over(root, *variant, where);
     }
   }
   for (const auto& change : overrides)

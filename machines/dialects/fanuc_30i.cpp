@@ -18,7 +18,6 @@ constexpr std::string_view kTipLetters = "XYZ";
 constexpr int kVectorDigits = 8;
 constexpr int kGuardDigits = 5;
 constexpr double kShortestBlock = 60.0 / 9999.999;  // s: F of G93 has four digits before the point
-constexpr double kTurned = 1e-7;                    // rad, of a part that counts as not turned
 
 class Emitter : public gcode::GcodePrinter {
  public:
@@ -55,10 +54,6 @@ class Emitter : public gcode::GcodePrinter {
       if (kAxisLetters.find(axis.letter) == std::string_view::npos)
         refuse("PR203", "axis " + axis.name + " has the letter " + std::string(1, axis.letter) +
                             ": this dialect has the axis words " + std::string(kAxisLetters));
-    if (has_poses() && rotation_log(program().part.linear()).norm() > kTurned)
-      refuse("PR203",
-             "the part is turned against the machine's axes, and G54 has no rotation: write "
-             "dialect.mode = \"joint\", or set the part straight (workpiece.frame)");
     for (const auto& m : program().moves) check_move(m);
   }
 
@@ -269,6 +264,7 @@ class Emitter : public gcode::GcodePrinter {
 }  // namespace
 
 Result<EmittedProgram> emit(const MachineDefinition& machine, const MachineProgram& program) {
+  if (gcode::is_turned(program)) return Emitter(machine, gcode::along_machine_axes(program)).run();
   return Emitter(machine, program).run();
 }
 

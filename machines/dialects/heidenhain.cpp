@@ -22,7 +22,6 @@ constexpr int kGuardDigits = 5;
 constexpr int kFeedDigits = 3;
 constexpr double kLargestFeed = 99999.999;
 constexpr double kTenthsOfInch = 10.0;  // F of a program in inch is in 0.1 inch/min
-constexpr double kTurned = 1e-7;        // rad, of a part that counts as not turned
 
 class Emitter : public ProgramPrinter {
  public:
@@ -51,11 +50,6 @@ class Emitter : public ProgramPrinter {
       if (kAxisLetters.find(axis.letter) == std::string_view::npos)
         refuse("PR203", "axis " + axis.name + " has the letter " + std::string(1, axis.letter) +
                             ": this dialect has the axis words " + std::string(kAxisLetters));
-    if (has_poses() && rotation_log(program().part.linear()).norm() > kTurned)
-      refuse("PR203",
-             "the part is turned against the machine's axes, and the preset is written without "
-             "rotation: write dialect.mode = \"joint\", or set the part straight "
-             "(workpiece.frame)");
     for (const auto& m : program().moves)
       if (is_tool(m) && m.joints != 0)
         return refuse("PR203",
@@ -250,6 +244,7 @@ class Emitter : public ProgramPrinter {
 }  // namespace
 
 Result<EmittedProgram> emit(const MachineDefinition& machine, const MachineProgram& program) {
+  if (gcode::is_turned(program)) return Emitter(machine, gcode::along_machine_axes(program)).run();
   return Emitter(machine, program).run();
 }
 

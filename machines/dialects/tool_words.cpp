@@ -1,5 +1,6 @@
 #include "machines/dialects/tool_words.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "kernels/core/units.h"
@@ -16,6 +17,23 @@ bool is_rotary(const MachineDefinition& machine, int j) {
 }
 
 }  // namespace
+
+MachineProgram along_machine_axes(const MachineProgram& program) {
+  MachineProgram out = program;
+  Pose turn = Pose::Identity();
+  turn.linear() = program.part.linear();
+  out.part.linear() = Mat3::Identity();
+  for (auto& move : out.moves) move.tool = turn * move.tool;
+  return out;
+}
+
+bool is_turned(const MachineProgram& program) {
+  constexpr double kLeast = 1e-9;  // rad
+  if (rotation_log(program.part.linear()).norm() < kLeast) return false;
+  return std::any_of(program.moves.begin(), program.moves.end(), [](const MachineMove& m) {
+    return m.interpolation == MoveInterpolation::tool;
+  });
+}
 
 ToolWords::ToolWords(const MachineDefinition& machine, const MachineProgram& program,
                      AxisWords& words)

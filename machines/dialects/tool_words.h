@@ -5,10 +5,19 @@
 #include <string>
 
 #include "kernels/kinematics/inverse.h"
+#include "machines/dialects/dialect.h"
 #include "machines/dialects/gcode_text.h"
 
 // Words of tool moves on machines with two rotary axes.
 namespace smoothpost::gcode {
+
+/// The same program with its part's frame along the machine's axes, at the same zero and with every
+/// joint 0: what controls need whose work offsets do not rotate. The poses of its moves are turned
+/// into it; what is read back from it has that frame as its part.   Cost: a copy.
+MachineProgram along_machine_axes(const MachineProgram& program);
+
+/// Whether along_machine_axes() would change a pose.
+bool is_turned(const MachineProgram& program);
 
 /// Prints the words of tool moves: X Y Z of the tip in W, with the positions of the rotary axes or
 /// the vector of the tool axis; only what changed, at least one. Follows the program move by move.

@@ -20,11 +20,15 @@ constexpr const char* kJoint = ", a=1.4, v=1.05)";
 constexpr const char* kLine = ", a=1.2, v=0.25)";  // m/s2, m/s
 constexpr double kLeastRadius = 0.1;               // mm
 constexpr double kProcessAcceleration = 1.2;       // m/s2, of movep
+constexpr const char* kServo = ", lookahead_time=0.03, gain=2000)";
+constexpr double kLeastServoTime = 0.002;  // s, a cycle of the e-Series
+constexpr const char* kServoName = "urscript_servoj";
 
 class Emitter : public robot::RobotPrinter {
  public:
   Emitter(const MachineDefinition& machine, const MachineProgram& program)
-      : RobotPrinter(machine, program, "URScript", kLeastRadius) {}
+      : RobotPrinter(machine, program, "URScript", kLeastRadius),
+        stream_(machine.dialect.name == kServoName) {}
 
  private:
   void check() override {
@@ -33,6 +37,8 @@ class Emitter : public robot::RobotPrinter {
       if (j >= 0)
         refuse("PR203", "axis " + machine().axes[static_cast<std::size_t>(j)].name +
                             ": URScript moves the six axes of the arm only");
+    if (stream_ && has_poses())
+      refuse("PR203", "servoj has joints only: write dialect.mode = \"joint\"");
   }
 
   // ---- literals
@@ -74,6 +80,12 @@ class Emitter : public robot::RobotPrinter {
     for (const auto& own : machine().dialect.start) statement_line(own);
     statement_line("sp_part = " + pose_text(program().part, kFrameDigits, kFrameDigits));
     statement_line("set_tcp(" + pose_text(tool(), kFrameDigits, kFrameDigits) + ")");
+    if (stream_) {
+      statement_line("def sp_hold(q):");
+      statement_line(std::string("  servoj(q, t=0.2") + kServo);
+      statement_line("  stopj(10)");
+      statement_line("end");
+    }
     if (machine().tool.load) {
       const LoadData& load = *machine().tool.load;
       std::string text = "set_payload(" + decimal_text(load.mass, 4) + ", [";
@@ -86,6 +98,7 @@ class Emitter : public robot::RobotPrinter {
   }
 
   void foot() override {
+    hold();
     for (const auto& own : machine().dialect.end) statement_line(own);
     line("end");
   }
@@ -94,11 +107,21 @@ class Emitter : public robot::RobotPrinter {
     statement_line("# " + plain_text(text, kMaxComment));
   }
   void label(const std::string& text) override { comment(text); }
-  void dwell(double seconds) override { statement_line("sleep(" + decimal_text(seconds, 4) + ")"); }
+  void dwell(double seconds) override {
+    hold();
+    statement_line("sleep(" + decimal_text(seconds, 4) + ")");
+  }
+
+  // The stream ends where its last target is.
+  void hold() {
+    if (!target_.empty()) statement_line("sp_hold(" + target_ + ")");
+    target_.clear();
+  }
 
   void statement(const std::string& words, const MachineAction& action) override {
     warn_on_the_fly(words, action,
                     "URScript runs a statement when the motion in front of it has ended");
+    hold();
     statement_line(words);
   }
 
@@ -106,7 +129,15 @@ class Emitter : public robot::RobotPrinter {
 
   void print_move(std::size_t i) override {
     const MachineMove& m = move(i);
-    statement_line(is_tool(m) ? line_text(i) : joint_text(m));
+    const bool streamed = stream_ && has_started() && !m.rapid && m.duration > 0.0;
+    if (streamed) {
+      target_ = joints_text(m.to);
+      statement_line("servoj(" + target_ + ", t=" +
+                     decimal_text(std::max(m.duration, kLeastServoTime), kTimeDigits) + kServo);
+    } else {
+      hold();
+      statement_line(is_tool(m) ? line_text(i) : joint_text(m));
+    }
     arrive(m);
     rounded_ = is_tool(m) && may_round(i);
   }
@@ -134,6 +165,8 @@ class Emitter : public robot::RobotPrinter {
   }
 
   bool rounded_ = false;  // the corner where the robot is
+  const bool stream_;
+  std::string target_;  // of the last servoj, until it is held
 };
 
 }  // namespace
@@ -152,5 +185,18 @@ const Dialect kDialect = {
     &emit,
     &read_back,
     "tool (set_tcp) and part's frame are those of the program itself"};
+
+const Dialect kServoDialect = {
+    kServoName,
+    "URScript (Universal Robots), joints as a stream of servoj",
+    "servoj: all joints linear from target to target in their times, taken as if the control's "
+    "filter (lookahead_time 0.03 s, gain 2000) left them nowhere; movej: all joints linear",
+    ToolTurn::none,
+    true,
+    &emit,
+    &read_back,
+    "tool (set_tcp) and part's frame are those of the program itself; the control follows the "
+    "targets of servoj: how far its filter lags behind them and rounds them off is not known here, "
+    "and has to be measured on the robot"};
 
 }  // namespace smoothpost::urscript

@@ -21,4 +21,9 @@ Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
 
 extern const Dialect kDialect;
 
+/// urscript_servoj: joint moves with a time as a stream of servoj, one target a move, which the
+/// control follows through a filter (lookahead_time, gain). In front of everything else the program
+/// holds the last target (sp_hold). Other moves are movej. Errors: PR203, a tool move.
+extern const Dialect kServoDialect;
+
 }  // namespace smoothpost::urscript

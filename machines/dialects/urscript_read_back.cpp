@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "machines/dialects/robot_program.h"
@@ -166,9 +167,12 @@ class Reading : public robot::RobotReading {
       return;
     }
     if (text.empty()) return;
+    if (read_hold(at, line)) return;
     if (text.front() == '#') return;
     if (result.last_line > 0) return error(at, "NC346", "text behind the end of the program");
     if (text == "end") {
+      if (streaming_) error(at, "the program ends before its last servoj is held");
+      if (hold_ > 0 && hold_ < kHold.size()) error(at, "NC346", "sp_hold has no end");
       result.last_line = at.line;
       return;
     }
@@ -178,6 +182,16 @@ class Reading : public robot::RobotReading {
         return error({at.line, column}, "NC346",
                      "program flow and variables are not read: " + std::string(text.substr(0, 64)));
     read_statement({at.line, column}, text);
+  }
+
+  // The lines of sp_hold, one behind the other, before the first motion.
+  bool read_hold(TextPlace at, std::string_view line) {
+    const bool open = hold_ > 0 && hold_ < kHold.size();
+    if (!open && (hold_ > 0 || line != kHold[0])) return false;
+    if (line != kHold[hold_] || !result.moves.empty())
+      return error(at, "NC346", "sp_hold is not the function that we write"), hold_ = 0, true;
+    ++hold_;
+    return true;
   }
 
   void read_statement(TextPlace at, std::string_view text) {
@@ -192,12 +206,42 @@ class Reading : public robot::RobotReading {
     if (result.moves.empty() && text == "popup(\"NOT CERTIFIED: read the report\", blocking=True)")
       return;
     const auto call = call_of(text);
+    if (call && read_stream(at, *call)) return;
+    if (streaming_)
+      return error(at, "this statement cuts off the stream of servoj: sp_hold has to be in front");
     if (call && read_call(at, *call)) return;
     needs_stop(at);
     if (read_event(at, text) || is_own_line(text)) return;
     error(at, call ? "NC347" : "NC346",
           "this statement is neither one of ours nor in the machine's process table: " +
               std::string(text.substr(0, 64)));
+  }
+
+  // servoj and sp_hold; false when the call is another.
+  bool read_stream(TextPlace at, const Call& call) {
+    using Kind = Argument::Kind;
+    const bool hold = call.name == "sp_hold";
+    if (!hold && call.name != "servoj") return false;
+    const bool good = hold ? call.is(Kind::list, {})
+                           : call.is(Kind::list, {"t", "lookahead_time", "gain"}) &&
+                                 call.arguments[1].number > 0.0;
+    if (!good || call.arguments[0].numbers.size() != 6)
+      return error(at, "NC346", call.name + " needs [..] of six joints and its times"), true;
+    const auto& target = call.arguments[0].numbers;
+    if (hold) {
+      if (!streaming_ || target != target_ || hold_ != kHold.size())
+        error(at, "sp_hold has another target than the servoj in front of it, or is not defined");
+      streaming_ = false;
+      return true;
+    }
+    if (call.arguments[2].number != 0.03 || call.arguments[3].number != 2000.0)
+      return error(at, "lookahead_time is 0.03 and gain 2000"), true;
+    if (!has_frames() || !all_known())
+      return error(at, "servoj stands before a movej, sp_part and set_tcp"), true;
+    for (std::size_t i = 0; i < 6; ++i) set_joint(axes().arm[i], target[i]);
+    add_joint_move(at, call.arguments[1].number);
+    target_ = target;
+    return streaming_ = true;
   }
 
   // False when the call is none of ours.
@@ -295,6 +339,12 @@ class Reading : public robot::RobotReading {
 
   bool begun_ = false;        ///< by def name():
   bool part_stated_ = false;  ///< by sp_part
+  static constexpr std::array<std::string_view, 4> kHold = {
+      "  def sp_hold(q):", "    servoj(q, t=0.2, lookahead_time=0.03, gain=2000)", "    stopj(10)",
+      "  end"};
+  std::size_t hold_ = 0;    ///< lines of sp_hold that have been read
+  bool streaming_ = false;  ///< the last motion is a servoj that is not held yet
+  std::vector<double> target_;
 };
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "postproc/pipeline/conversion_parts.h"
 #include "postproc/pipeline/orientation_check.h"
 #include "postproc/pipeline/path_match.h"
+#include "postproc/pipeline/process_check.h"
 #include "postproc/pipeline/registry.h"
 #include "postproc/pipeline/tool_motion.h"
 
@@ -75,6 +76,10 @@ Checks shape_checks(const CheckInput& in, const FollowedProgram& program, const 
       "their ends is not known so closely";
   PathMatchSettings settings{tip, axis};
   settings.beam = beam;
+  ProcessNumbers process = process_numbers(read, path, in.machine);
+  settings.program_process = std::move(process.program);
+  settings.input_process = std::move(process.input);
+  settings.event_tolerance = in.machine.tolerance.event;
   const bool whole = in.machine.recipe.task == "pose";
   if (whole) settings.whole_rotation = input_tool_rotation(chain.tool_axis, in.machine.recipe.spin);
   if (free && axis > 0.0) settings.freed = freed_beam(in, reference, cuts, tree, allowance);
@@ -183,7 +188,10 @@ Conversion check_program(const CheckInput& in, const Progress& progress) {
   if (!in.against) {
     out.not_checked.push_back("tip_deviation");
     out.not_checked.push_back("axis_deviation");
+    out.not_checked.push_back("process_as_programmed");
   }
+  out.not_checked.push_back("feed");
+  out.not_checked.push_back("process_values");
   const Dialect* dialect = find_dialect(in.machine.dialect.name);
   if (!dialect) {
     out.diagnostics.push_back(diagnostic(

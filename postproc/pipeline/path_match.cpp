@@ -23,7 +23,15 @@ struct Sample {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // of whole rotations
   std::optional<CuttingFrame> frame = {};  // of the input, where the beam is freed
   double turn = 0.0;                       // of the frame to the neighbours, rad
+  bool rapid = false;       // of the program: a rapid; of the input: a rapid may pass here
+  bool any_process = true;  // of the input: the process may be another here
+  std::uint32_t process = 0;
 };
+
+/// Whether a program sample may stand for an input sample, wherever they are.
+bool agree(const Sample& program, const Sample& input) {
+  return (!program.rapid || input.rapid) && (input.any_process || program.process == input.process);
+}
 
 /// Distances in shares of the tolerances.
 class Metric {
@@ -116,8 +124,9 @@ void add_turns(std::vector<Sample>& samples) {
 /// The program's moves as samples, one after the other, without keeping them.
 class ProgramSamples {
  public:
-  ProgramSamples(const ReadBack& program, const ScrewChain& chain, const Metric& metric)
-      : program_(program), chain_(chain), metric_(metric) {}
+  ProgramSamples(const ReadBack& program, const ScrewChain& chain, const Metric& metric,
+                 const std::vector<std::uint32_t>& process)
+      : program_(program), chain_(chain), metric_(metric), process_(process) {}
 
   /// The first move that can be sampled: every joint known before it.
   std::size_t first_move() const {
@@ -144,9 +153,12 @@ class ProgramSamples {
     const int n = metric_.steps(chord + bend, bend);
     std::vector<Sample> samples;
     samples.reserve(static_cast<std::size_t>(n));
-    for (int k = 1; k <= n; ++k)
+    for (int k = 1; k <= n; ++k) {
       samples.push_back(sample(from + static_cast<double>(k) / n * (to - from), tool_length,
                                program_.moves[i].line));
+      samples.back().rapid = program_.moves[i].rapid;
+      samples.back().process = process_.empty() ? 0 : process_[i];
+    }
     return samples;
   }
 
@@ -172,15 +184,39 @@ class ProgramSamples {
   const ReadBack& program_;
   const ScrewChain& chain_;
   const Metric& metric_;
+  const std::vector<std::uint32_t>& process_;
 };
+
+/// Marks the samples within `tolerance` along the path of a change of the process, or of an end.
+void free_around_changes(std::vector<Sample>& samples, double tolerance) {
+  const auto changes = [&samples](std::size_t i) {
+    return i == 0 || i == samples.size() || samples[i].process != samples[i - 1].process;
+  };
+  const auto step = [&samples](std::size_t i) {
+    return (samples[i].location.tip - samples[i - 1].location.tip).norm();
+  };
+  double way = 0.0;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    way = changes(i) ? 0.0 : way + step(i);
+    samples[i].any_process = way <= tolerance;
+  }
+  for (std::size_t i = samples.size(); i-- > 0;) {
+    way = changes(i + 1) ? 0.0 : way + step(i + 1);
+    samples[i].any_process = samples[i].any_process || way <= tolerance;
+  }
+}
 
 /// One stretch of the input between replanned segments, as samples.
 std::vector<Sample> input_samples(const ReferencePath& input, std::size_t first, std::size_t last,
-                                  const Metric& metric) {
+                                  const Metric& metric, const PathMatchSettings& settings) {
   const auto& points = input.path().points;
   std::vector<Sample> samples;
   samples.push_back({points[first].location, points[first].line, points[first].rotation});
   samples.back().frame = frame_at(metric, first + 1, 0.0);
+  const auto process = [&settings](std::size_t k) {
+    return settings.input_process.empty() ? 0U : settings.input_process[k];
+  };
+  samples.back().process = process(first + 1);
   for (std::size_t k = first + 1; k <= last; ++k) {
     const double bend = metric.bend(input.second_derivative_bound(k));
     const int n = metric.steps(
@@ -190,9 +226,13 @@ std::vector<Sample> input_samples(const ReferencePath& input, std::size_t first,
     for (int i = 1; i <= n; ++i) {
       samples.push_back(input_sample(input, k, static_cast<double>(i) / n, metric));
       samples.back().frame = frame_at(metric, k, static_cast<double>(i) / n);
+      samples.back().rapid = points[k].kind == MotionKind::rapid;
+      samples.back().process = process(k);
     }
   }
   add_turns(samples);
+  samples.front().rapid = samples.back().rapid = true;  // where links begin and end
+  free_around_changes(samples, settings.event_tolerance);
   return samples;
 }
 
@@ -215,7 +255,7 @@ class Stretch {
       if (j == 0 && may_start) best = 0.0;
       double v = kNever;
       if (best < kNever) {
-        const double d = metric_.between(sample, input_[j]);
+        const double d = agree(sample, input_[j]) ? metric_.between(sample, input_[j]) : kNever;
         if (d <= 1.0 - kAllowance) v = std::max(best, d);
       }
       left = v;
@@ -266,7 +306,7 @@ class Matcher {
         settings_(settings),
         progress_(progress),
         metric_(settings),
-        samples_(program, chain, metric_) {}
+        samples_(program, chain, metric_, settings_.program_process) {}
 
   PathMatch run() {
     move_ = samples_.first_move();
@@ -295,7 +335,7 @@ class Matcher {
 
   bool match_stretch(std::size_t first, std::size_t last) {
     const double tool_length = input_.path().points[first].tool_length;
-    const std::vector<Sample> wanted = input_samples(input_, first, last, metric_);
+    const std::vector<Sample> wanted = input_samples(input_, first, last, metric_, settings_);
     Stretch stretch(wanted, metric_);
     bool only_rapids = true;
     double best = kNever;
@@ -328,7 +368,8 @@ class Matcher {
     }
     if (best == kNever) {
       fail(stretch.input_line(), stretch.output_line(),
-           "the program leaves the input's path here, or a block is missing or doubled");
+           "the program leaves the input's path here, a block is missing or doubled or a rapid, or "
+           "the process (spindle, coolant, beam, gas, tool) is not as the input has it");
       return false;
     }
     if (best >= out_.share) {
@@ -366,6 +407,11 @@ PathMatch match_paths(const ReadBack& program, const ScrewChain& chain, const Re
   require(!settings.freed || (settings.freed->lead >= settings.axis_tolerance &&
                               settings.freed->tilt >= settings.axis_tolerance),
           "a freed beam's tolerances are at least the axis'");
+  require(settings.program_process.empty() == settings.input_process.empty() &&
+              (settings.program_process.empty() ||
+               (settings.program_process.size() == program.moves.size() &&
+                settings.input_process.size() == input.path().points.size())),
+          "process numbers for every move and point");
   return Matcher(program, chain, input, settings, progress).run();
 }
 

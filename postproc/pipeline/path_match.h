@@ -30,6 +30,11 @@ struct PathMatchSettings {
   std::optional<Mat3> whole_rotation = {};
   bool beam = false;  ///< cuts have the beam on: feeds without it are links too
   std::optional<FreedBeam> freed = {};
+  /// What the process does, as equal or different numbers: during each move of the program, and on
+  /// the segment that ends at each point of the input. Both empty: not compared.
+  std::vector<std::uint32_t> program_process = {};
+  std::vector<std::uint32_t> input_process = {};
+  double event_tolerance = 0.0;  ///< mm along the input, where the process may change off its place
 };
 
 /// Whether a program follows an input, without a line map.
@@ -56,10 +61,13 @@ struct PathMatch {
 /// changes more than the axis does, and what the frame's turning from one sample to the next may
 /// add (δ²/8 of the combined deviation), is added to them; normals are taken at the samples. The
 /// program may have rapids (with settings.beam also feeds without beam) that the input does not
-/// have: before it, after it, and where the input's own way is replanned. A feed move that matches
+/// have: before it, after it, and where the input's own way is replanned. Feeds of the input are
+/// matched by feeds only, and with the process as it is there; around its changes and the ends of
+/// cuts, within event_tolerance, it may be another. A feed move that matches
 /// nothing, a dropped or a doubled block end the matching. `chain` is the program's machine with
-/// tool length 0 and the part placed. Cost: linear in the path length over the tolerance; memory:
-/// the band and the samples of one segment run.
+/// tool length 0 and the part placed. @pre process numbers for every move and point, or none. Cost:
+/// linear in the path length over the tolerance; memory: the band and the samples of one segment
+/// run.
 PathMatch match_paths(const ReadBack& program, const ScrewChain& chain, const ReferencePath& input,
                       const PathMatchSettings& settings, const Progress& progress);
 

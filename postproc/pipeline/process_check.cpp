@@ -47,6 +47,36 @@ Check process_check(const ReadBack& read, const LineMap& map, const std::vector<
   return c;
 }
 
+ProcessNumbers process_numbers(const ReadBack& read, const ToolPath& input,
+                               const MachineDefinition& machine) {
+  const bool ours = follows_power(machine);
+  std::map<std::pair<ProcessStates, bool>, std::uint32_t> known;
+  const auto number = [&](ProcessStates states, bool beam) {
+    std::erase_if(states, [&](const auto& s) {
+      return !machine.has_event(s.second) || (ours && s.second == event_name::kPower);
+    });
+    const auto next = static_cast<std::uint32_t>(known.size());
+    return known.emplace(std::pair(std::move(states), beam), next).first->second;
+  };
+  ProcessNumbers out;
+  ProcessStates states;
+  std::size_t event = 0;
+  for (std::size_t i = 0; i < read.moves.size(); ++i) {
+    for (; event < read.events.size() && read.events[event].before <= i; ++event)
+      note_state(read.events[event].name, states);
+    out.program.push_back(number(states, read.moves[i].beam));
+  }
+  states.clear();
+  event = 0;
+  for (std::size_t k = 0; k < input.points.size(); ++k) {
+    for (; event < input.events.size() && input.events[event].point < k; ++event)
+      if (input.events[event].kind == PathEvent::Kind::process)
+        note_state(input.events[event].event.name, states);
+    out.input.push_back(number(states, input.points[k].beam));
+  }
+  return out;
+}
+
 bool follows_power(const MachineDefinition& machine) {
   return !machine.power.speed.empty() && machine.power.by_program &&
          machine.has_event(event_name::kPower);

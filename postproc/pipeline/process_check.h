@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <string>
 #include <vector>
@@ -24,6 +25,16 @@ std::vector<ProcessStates> programmed_states(const InterpretedInput& input, bool
 /// Check process_as_programmed: the states at the start of every cut, from the text, are `wanted`.
 Check process_check(const ReadBack& read, const LineMap& map, const std::vector<Cut>& cuts,
                     const std::vector<ProcessStates>& wanted, const MachineDefinition& machine);
+
+/// What the process does along a program and along its input: equal numbers for equal states (with
+/// the beam), of each move and of the segment that ends at each point. Only what the machine has
+/// words for, and not the power where the program commands it by speed.
+struct ProcessNumbers {
+  std::vector<std::uint32_t> program;
+  std::vector<std::uint32_t> input;
+};
+ProcessNumbers process_numbers(const ReadBack& read, const ToolPath& input,
+                               const MachineDefinition& machine);
 
 /// True when the program itself commands the beam's power by speed (follow_power).
 bool follows_power(const MachineDefinition& machine);

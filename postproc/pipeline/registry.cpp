@@ -15,6 +15,8 @@
 #include "machines/dialects/ros_trajectory.h"
 #include "machines/dialects/siemens_840d.h"
 #include "machines/dialects/urscript.h"
+#include "machines/dialects/val3.h"
+#include "machines/dialects/yaskawa_jbi.h"
 
 namespace smoothpost {
 
@@ -33,7 +35,7 @@ constexpr std::array<InputFormat, 3> kFormats = {{
 std::span<const InputFormat> input_formats() { return kFormats; }
 
 std::span<const Dialect> dialects() {
-  static const std::array<Dialect, 18> rows = {
+  static const std::array<Dialect, 21> rows = {
       beckhoff::kDialect,           fanuc_30i::kDialect,
       fanuc_30i::kVectorDialect,    fanuc_ls::kDialect,
       grbl::kDialects[0],           grbl::kDialects[1],
@@ -42,7 +44,9 @@ std::span<const Dialect> dialects() {
       heidenhain::kVectorDialect,   krl::kDialect,
       linuxcnc::kDialect,           rapid::kDialect,
       ros_trajectory::kRos1Dialect, ros_trajectory::kDialect,
-      siemens_840d::kDialect,       urscript::kDialect};
+      siemens_840d::kDialect,       urscript::kDialect,
+      urscript::kServoDialect,      val3::kDialect,
+      yaskawa_jbi::kDialect};
   return rows;
 }
 

@@ -62,6 +62,15 @@ constexpr std::array kUnchecked = {
         "The program was compared with no input (--against): its shape is not certified."},
     Row{"axis_deviation",
         "The program was compared with no input (--against): its tool axes are not certified."},
+    Row{"process_as_programmed",
+        "The program was compared with no input (--against): when spindle, coolant, gas and beam "
+        "are on is not certified."},
+    Row{"feed",
+        "The program's feeds were held against the axes' velocities, not against the input's "
+        "feeds."},
+    Row{"process_values",
+        "Values of events, such as spindle speed and tool number, and waits and stops were not "
+        "compared with the input's."},
 };
 
 template <typename Table>

@@ -120,6 +120,30 @@ TEST_CASE("variant: another dialect without one has no words", "[machines][defin
   CHECK(changed.dialect.extension == "src");
 }
 
+TEST_CASE("variant: a table for the first part of the name, and digits that the control has",
+          "[machines][definition]") {
+  const std::string family =
+      "[variant.grbl.process.events]\ngas_on = \"M64\"\n"
+      "[variant.grbl_marlin.process.events]\ngas_on = \"M42\"\n";
+  const auto words = [&family](const char* name) {
+    return parse(file(family), {{"dialect.name", name}}).process.events.at(0).text;
+  };
+  CHECK(words("grbl") == "M64");
+  CHECK(words("grbl_fluidnc") == "M64");
+  CHECK(words("grbl_marlin") == "M42");
+  CHECK(parse(file(family), {{"dialect.name", "grblx"}}).process.events.empty());
+  const std::string plain = kAxis;
+  const auto digits = [&plain](std::vector<MachineOverride> more, const std::string& text) {
+    more.insert(more.begin(), {"dialect.name", "heidenhain_vectors"});
+    const auto machine = parse(plain + text, more);
+    return std::pair(machine.dialect.digits_length, machine.dialect.digits_angle);
+  };
+  CHECK(digits({}, "") == std::pair(4, 4));
+  CHECK(digits({}, "[dialect]\ndigits_mm = 3\ndigits_deg = 5\n") == std::pair(3, 4));
+  CHECK(digits({{"dialect.units", "inch"}}, "") == std::pair(4, 4));
+  CHECK(digits({{"dialect.digits_mm", "6"}}, "").first == 6);  // asked for: the dialect refuses it
+}
+
 TEST_CASE("variant: overrides come last", "[machines][definition]") {
   const auto machine = parse(file(), {{"dialect.digits_mm", "6"},
                                       {"dialect.name", "linuxcnc"},

@@ -1,6 +1,6 @@
 #include "machines/dialects/fanuc_30i.h"
 
-#include "tests/machines/dialects/random_programs.h"
+#include "tests/machines/dialects/turned_part.h"
 
 using namespace smoothpost;
 using namespace smoothpost::test;
@@ -150,6 +150,15 @@ TEST_CASE("fanuc_30i: events and tool changes", "[machines][dialects]") {
   CHECK_FALSE(back.moves[4].beam);
 }
 
+TEST_CASE("fanuc_30i: a turned part is written along the machine's axes", "[machines][dialects]") {
+  std::mt19937 rng(31);
+  for (const char* name : {"table_table_bc", "head_head_ca", "head_table_bc"})
+    for (const Dialect* dialect : {&fanuc_30i::kDialect, &fanuc_30i::kVectorDialect}) {
+      const auto machine = machine_of(name, *dialect);
+      require_turned_part(*dialect, machine, rng);
+    }
+}
+
 TEST_CASE("fanuc_30i: what cannot be printed is refused", "[machines][dialects]") {
   const auto machine = machine_of("table_table_bc", fanuc_30i::kDialect);
   const auto refused = [](const MachineDefinition& m, const MachineProgram& p) {
@@ -158,9 +167,6 @@ TEST_CASE("fanuc_30i: what cannot be printed is refused", "[machines][dialects]"
     CHECK(out.diagnostics()[0].code == "PR203");
     return out.diagnostics()[0].text;
   };
-  auto turned = short_tool_program(machine);
-  turned.part.linear() = rotation_about(Vec3::UnitZ(), 0.01);
-  CHECK(refused(machine, turned).find("turned") != std::string::npos);
   auto redundant = short_tool_program(machine);
   redundant.moves[1].joints = 1;
   refused(machine, redundant);

@@ -1,6 +1,6 @@
 #include "machines/dialects/heidenhain.h"
 
-#include "tests/machines/dialects/random_programs.h"
+#include "tests/machines/dialects/turned_part.h"
 
 using namespace smoothpost;
 using namespace smoothpost::test;
@@ -126,6 +126,15 @@ TEST_CASE("heidenhain: events and the beam", "[machines][dialects]") {
   CHECK_FALSE(back.moves[4].beam);
 }
 
+TEST_CASE("heidenhain: a turned part is written along the machine's axes", "[machines][dialects]") {
+  std::mt19937 rng(32);
+  for (const char* name : {"table_table_bc", "head_head_ca", "head_table_bc"})
+    for (const Dialect* dialect : {&heidenhain::kDialect, &heidenhain::kVectorDialect}) {
+      const auto machine = machine_of(name, *dialect);
+      require_turned_part(*dialect, machine, rng);
+    }
+}
+
 TEST_CASE("heidenhain: what cannot be printed is refused", "[machines][dialects]") {
   const auto machine = machine_of("table_table_bc", heidenhain::kDialect);
   const auto refused = [](const MachineDefinition& m, const MachineProgram& p) {
@@ -135,9 +144,6 @@ TEST_CASE("heidenhain: what cannot be printed is refused", "[machines][dialects]
     return out.diagnostics()[0].text;
   };
   const auto program = short_tool_program(machine);
-  auto turned = program;
-  turned.part.linear() = rotation_about(Vec3::UnitZ(), 0.01);
-  refused(machine, turned);
   auto fast = program;
   fast.moves[2].duration = 1e-4;
   CHECK(refused(machine, fast).find("feed") != std::string::npos);

@@ -36,6 +36,9 @@ inline MachineProgram random_arm_program(const MachineDefinition& machine, std::
 struct TimeError {
   double share = 1e-5;
   double seconds = 1e-6;
+  /// False: joint moves have a time only where their start is known, tool moves only where they go
+  /// anywhere.
+  bool always = true;
 };
 
 /// Joints to half a digit (rounding of the text's own unit included), tip to two units of the last
@@ -60,10 +63,12 @@ inline std::size_t require_same_arm_program(const Dialect& dialect,
     REQUIRE(found.line == out.move_lines[i]);
     REQUIRE(found.blend <= planned.blend * (1 + 1e-9));
     rounded += found.blend > 0.0 ? 1 : 0;
-    if (!planned.rapid)
+    const bool tool = planned.interpolation == MoveInterpolation::tool;
+    const bool goes = tool && !planned.tool.isApprox(program.moves[i - 1].tool, 1e-9);
+    if (!planned.rapid && (time.always || goes))
       REQUIRE(std::abs(found.duration - planned.duration) <=
               time.share * planned.duration + time.seconds);
-    if (planned.interpolation == MoveInterpolation::joints) {
+    if (!tool) {
       require_same_joints(machine, planned, found);
       continue;
     }
@@ -74,6 +79,29 @@ inline std::size_t require_same_arm_program(const Dialect& dialect,
             radians_from_degrees(1e-4));
   }
   return rounded;
+}
+
+/// Joint moves of a program of joint moves only take what is planned, or what 99.99 % of the axes'
+/// speeds take: never less, and no more than a share `share` longer. Returns how many were timed.
+inline std::size_t require_joint_times(const Dialect& dialect, const MachineDefinition& machine,
+                                       const MachineProgram& program, double share) {
+  const auto back = read_back(dialect, machine, emitted(dialect, machine, program).text);
+  REQUIRE(back.moves.size() == program.moves.size());
+  std::size_t timed = 0;
+  for (std::size_t i = 1; i < program.moves.size(); ++i) {
+    const auto& planned = program.moves[i];
+    REQUIRE(back.moves[i].rapid == planned.rapid);
+    if (planned.rapid) continue;
+    double least = 0.0;
+    for (int j = 0; j < machine.size(); ++j)
+      least = std::max(least, std::abs(planned.to[j] - program.moves[i - 1].to[j]) /
+                                  machine.axes[static_cast<std::size_t>(j)].velocity);
+    const double expected = std::max(planned.duration, least / 0.9999);
+    REQUIRE(back.moves[i].duration >= expected * (1 - 1e-4));
+    REQUIRE(back.moves[i].duration <= expected * (1 + share));
+    ++timed;
+  }
+  return timed;
 }
 
 /// Two straight moves with a corner of 5 mm between them, and a joint move in front.

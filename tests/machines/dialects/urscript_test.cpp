@@ -160,3 +160,56 @@ TEST_CASE("urscript: what could move differently than certified is refused",
   std::mt19937 rng(82);
   require_bounded(urscript::kDialect, machine, good, rng);
 }
+
+TEST_CASE("urscript_servoj: a stream of targets, held before everything else",
+          "[machines][dialects]") {
+  const auto machine = shipped_machine(
+      "robot_6r", {{"dialect.name", "urscript_servoj"}, {"dialect.digits_deg", "7"}});
+  const Dialect& dialect = urscript::kServoDialect;
+  std::mt19937 rng(82);
+  for (int round = 0; round < 100; ++round)
+    require_same_arm_program(dialect, machine, random_joint_program(machine, rng, 10), {});
+  MachineProgram program;
+  program.part.translation() = Vec3(1400, 0, 600);
+  MachineMove move;
+  move.to = home_of(machine);
+  move.joints = 63;
+  move.rapid = true;
+  program.moves = {move};
+  move.rapid = false;
+  move.duration = 0.008;
+  for (int i = 0; i < 3; ++i) {
+    move.to[0] += 0.001;
+    program.moves.push_back(move);
+  }
+  move.rapid = true;
+  program.moves.push_back(move);
+  program.actions = {event("coolant_on", 2)};
+  const auto good = emitted(dialect, machine, program).text;
+  INFO(good);
+  const std::string servo = ", t=0.008, lookahead_time=0.03, gain=2000)\n";
+  CHECK(good.find(servo + "  sp_hold(") < good.find("  set_standard_digital_out(2, True)"));
+  const auto back = read_back(dialect, machine, good);
+  REQUIRE(back.moves.size() == 5);
+  CHECK(back.moves[2].duration == Approx(0.008));
+  CHECK_FALSE(back.moves[1].rapid);
+  CHECK(back.events.at(0).before == 2);
+  const auto first_hold =
+      good.substr(good.find("  sp_hold("), good.find("  set_standard") - good.find("  sp_hold("));
+  const std::vector<std::pair<std::string, std::string>> changes = {
+      {first_hold, ""},
+      {"  sp_hold([0.001", "  sp_hold([0.002"},
+      {"t=0.008, lookahead_time=0.03", "t=0, lookahead_time=0.03"},
+      {"t=0.008, lookahead_time=0.03", "t=0.008, lookahead_time=0.2"},
+      {"t=0.008, lookahead_time=0.03, gain=2000", "t=0.008"},
+      {"    stopj(10)\n", ""},
+      {"servoj(q, t=0.2", "servoj(q, t=0.02"},
+      {"  end\n", ""},
+      {"  def sp_hold(q):", "  def sp_hold(p):"},
+      {"  movej(", "  servoj("},
+  };
+  CHECK(require_refused(dialect, machine, good, changes) == 10);
+  auto tool = short_arm_program(machine);
+  CHECK_FALSE(dialect.emit(machine, tool).ok());
+  require_bounded(dialect, machine, good, rng);
+}
