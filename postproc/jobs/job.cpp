@@ -57,7 +57,8 @@ class Run {
     if (!options_make_sense() || !load_output_machine() || !load_input()) return finish();
     ConvertInput in;
     if (!read_convert_input(in)) return finish();
-    in.timed = !options_.trajectory.empty() || wants_page();
+    in.stream = !options_.trajectory.empty();
+    in.timed = in.stream || wants_page();
     in.collision_check = !options_.no_collision_check;
     std::optional<Conversion> made;
     if (automatic())
@@ -73,7 +74,8 @@ class Run {
     ConvertInput in;
     FinishPath path;
     if (!read_finish_input(in, path)) return finish();
-    in.timed = !options_.trajectory.empty() || wants_page();
+    in.stream = !options_.trajectory.empty();
+    in.timed = in.stream || wants_page();
     in.collision_check = !options_.no_collision_check;
     in.finish = &path;
     return deliver(in, convert(in, options_.force, progress_));
@@ -116,17 +118,16 @@ class Run {
 
  private:
   JobResult deliver(const ConvertInput& in, const Conversion& conversion) {
-    const ScrewChain chain = placed(in.placement);
-    const double tool_length = in.input.path.points.front().tool_length;
     context_.cutter_locations = in.input.path.points.size();
     context_.input_lines = in.input.lines;
     report(conversion, shown(in));
-    if (!options_.trajectory.empty() && !conversion.timeline.items.empty())
-      result_.trajectory =
-          trajectory_csv(conversion.timeline, machine_.definition, chain, tool_length);
     result_.line_map = line_map_json(conversion.line_map, base_name(input_name_));
-    if (conversion.verdict == Verdict::certified || conversion.verdict == Verdict::forced)
+    if (conversion.verdict == Verdict::certified || conversion.verdict == Verdict::forced) {
       result_.program = conversion.program;
+      // --force does not write a stream: it has no place for a warning and no operator stop.
+      if (conversion.stream && conversion.stream->ok())
+        result_.trajectory = conversion.stream->text;
+    }
     return finish();
   }
 
@@ -506,12 +507,6 @@ class Run {
     return true;
   }
 
-  ScrewChain placed(const Pose& placement) const {
-    ScrewChain chain = chain_of(machine_.definition);
-    chain.workpiece_home = chain.workpiece_home * placement;
-    return chain;
-  }
-
   // Comments of some controls end at 120 characters.
   static void add_wrapped(std::string text, std::vector<std::string>& lines) {
     constexpr std::size_t kLongest = 118;
@@ -545,6 +540,10 @@ class Run {
   void report(const Conversion& conversion, const PageParts& parts) {
     add(conversion.diagnostics);
     if (!conversion.program.empty()) context_.program_sha256 = sha256(conversion.program);
+    if (conversion.stream) {
+      context_.stream_file = base_name(options_.trajectory);
+      context_.stream_sha256 = sha256(conversion.stream->text);
+    }
     Conversion told = conversion;
     told.diagnostics = result_.diagnostics;
     result_.report = report_json(told, context_);

@@ -1,8 +1,10 @@
 #include "postproc/pipeline/conversion_notes.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string_view>
 
+#include "machines/dialects/decimal.h"
 #include "postproc/pipeline/conversion_parts.h"
 
 namespace smoothpost {
@@ -24,6 +26,14 @@ std::string number(double value) {
   std::string text = std::to_string(value);
   while (text.back() == '0') text.pop_back();
   if (text.back() == '.') text.pop_back();
+  return text;
+}
+
+std::string four_digits(double value) {
+  if (!(std::abs(value) > 0.0)) return "0";
+  const int places = 3 - static_cast<int>(std::floor(std::log10(std::abs(value))));
+  std::string text;
+  append_decimal(text, value, std::clamp(places, 0, 9));
   return text;
 }
 

@@ -11,6 +11,8 @@ namespace smoothpost {
 
 /// Six decimals without trailing zeros.
 std::string number(double value);
+/// Four significant digits.
+std::string four_digits(double value);
 
 /// Kind, shape and shares of the tolerances by the machine's recipe.
 SmoothingSettings smoothing_settings(const MachineDefinition& machine);

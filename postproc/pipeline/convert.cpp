@@ -421,6 +421,8 @@ class Converter {
     out_.schedule = std::move(scheduled.value());
     append(out_.diagnostics, schedule_notes(out_.schedule, in_.machine, in_.input_name));
     plan.samples = timed_samples(std::move(plan.samples), out_.schedule);
+    if (follows_power(in_.machine))
+      plan.samples = split_at_powers(plan.samples, reference_, out_.schedule, in_.machine);
     return true;
   }
 
@@ -602,7 +604,27 @@ class Converter {
     out_.checks.push_back(
         process_check(motion.read, out_.line_map, cuts_, wanted_states_, in_.machine));
     for (Check& c : out_.checks) give_input_line(c);
+    out_.executed = executed_time(out_.read, in_.machine);
     watch_.lap("verify");
+    return !in_.stream || certify_stream(with);
+  }
+
+  // The joints at the control's cycle, with checks of their own.
+  bool certify_stream(const DeviationInput& with) {
+    auto stream = certified_stream(
+        {out_.timeline, in_.machine, with, program_.tool_length, make_scene() ? &*scene_ : nullptr},
+        progress_);
+    watch_.lap("stream");
+    for (auto d : stream.diagnostics()) {
+      if (d.where.file.empty()) d.where.file = in_.input_name;
+      out_.diagnostics.push_back(std::move(d));
+    }
+    if (!stream.ok()) return false;
+    out_.stream = std::move(stream.value());
+    for (const Check& c : out_.stream->checks)
+      if (!c.ok)
+        out_.diagnostics.push_back(diagnostic("CK102", "joint stream: " + describe(c),
+                                              in_.input_name, static_cast<int>(c.input_line)));
     return true;
   }
 

@@ -7,8 +7,10 @@
 #include "kernels/core/mesh.h"
 #include "kernels/core/progress.h"
 #include "postproc/pipeline/cuts.h"
+#include "postproc/pipeline/executed_time.h"
 #include "postproc/pipeline/feed_schedule.h"
 #include "postproc/pipeline/interpret.h"
+#include "postproc/pipeline/joint_stream.h"
 #include "postproc/pipeline/laser_plan.h"
 #include "postproc/pipeline/line_map.h"
 #include "postproc/pipeline/smoothed_path.h"
@@ -33,6 +35,7 @@ struct ConvertInput {
   bool keep_links = false;         ///< --links keep: rapids stay as the input has them
   std::optional<CutRange> cuts;    ///< --cuts: the others are left out
   bool timed = false;              ///< make Conversion::timeline
+  bool stream = false;             ///< make Conversion::stream; needs `timed`
   bool collision_check = true;     ///< false: --no-collision-check
   /// `input` is this path of make_finish_path(), whose joints plan_finish() plans; outlives the
   /// call
@@ -74,14 +77,16 @@ struct Conversion {
   ToleranceBudget budget_mm;  ///< mm, not shares
   double programmed_time = 0.0;
   double scheduled_time = 0.0;
+  ExecutedTime executed;
   double length = 0.0;  ///< mm, of the tip
   std::vector<CutSummary> cuts;
   std::vector<SmoothedCorner> corners;
   std::vector<LaserStretch> stretches;  ///< of optimise = "jerk", in path order
   FeedSchedule schedule;
-  Timeline timeline;  ///< empty unless ConvertInput::timed
-  ToolPath path;      ///< the input's, split where cuts were, as the line map counts its segments;
-                      ///< empty unless ConvertInput::timed
+  Timeline timeline;                  ///< empty unless ConvertInput::timed
+  std::optional<JointStream> stream;  ///< of ConvertInput::stream; its checks are its own
+  ToolPath path;  ///< the input's, split where cuts were, as the line map counts its segments;
+                  ///< empty unless ConvertInput::timed
   std::uint32_t merged_points = 0;
   std::uint32_t fitted_points = 0;  ///< that curves took the place of
   std::size_t links = 0;

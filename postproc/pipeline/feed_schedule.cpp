@@ -9,52 +9,25 @@
 #include <thread>
 
 #include "kernels/core/units.h"
-#include "kernels/schedule/constant_feed.h"
-#include "machines/dialects/decimal.h"
+#include "postproc/pipeline/conversion_notes.h"
 #include "postproc/pipeline/conversion_parts.h"
 #include "postproc/pipeline/machine_program.h"
+#include "postproc/pipeline/stretch_feed.h"
 
 namespace smoothpost {
 
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr int kPlaces = 24;      // of a piece, for a constant feed
 constexpr int kBlockRounds = 1;  // caps for blocks that are too short
 // Elements a quarter as long as a joint takes from no acceleration to its largest: 0.2 % slower
 // than half of that (findings of the schedule, section 3).
 constexpr double kElementShare = 0.25, kShortestElement = 0.007, kLongestElement = 0.030;
 constexpr double kBlockReserve = 1e-3;  // by which those caps are lower
 constexpr double kPeakStep = 5e-4;      // s, where peaks are looked for
-constexpr std::size_t kMostTold = 12;   // lines in a message
 constexpr double kLeastTime = 1e-4;     // s, of a block that goes nowhere
 constexpr double kNoBlock = 1e-6;       // of a stretch: no way
 constexpr double kFull = 0.995;         // of the programmed feed: not slowed
-
-/// Four significant digits.
-std::string number(double value) {
-  if (!(std::abs(value) > 0.0)) return "0";
-  const int places = 3 - static_cast<int>(std::floor(std::log10(std::abs(value))));
-  std::string text;
-  append_decimal(text, value, std::clamp(places, 0, 9));
-  return text;
-}
-
-const char* word(FeedOverload::Kind kind) {
-  switch (kind) {
-    case FeedOverload::Kind::velocity:
-      return "velocity";
-    case FeedOverload::Kind::acceleration:
-      return "acceleration";
-    default:
-      return "jerk";
-  }
-}
-
-/// A bound of ds/dt between two places.
-struct RateCap {
-  double from = 0.0, to = 0.0, rate = kInfinity;
-};
 
 class Scheduler {
  public:
@@ -68,14 +41,19 @@ class Scheduler {
 
   Result<FeedSchedule> run() {
     FeedSchedule out;
-    for (JointStretch& stretch : joint_stretches(in_.path)) {
+    std::vector<JointStretch> stretches = joint_stretches(in_.path);
+    std::vector<TooFast> overloaded;
+    if (machine_.recipe.schedule == "programmed")
+      stretches = at_programmed_feed(std::move(stretches), in_.path, limits_, overloaded);
+    if (machine_.recipe.schedule == "constant")
+      lower_to_constant(stretches, in_.cuts, samples_, limits_);
+    if (!overloaded.empty())
+      return Result<FeedSchedule>::failure(too_fast_problem(overloaded, machine_, in_.file_name));
+    for (JointStretch& stretch : stretches) {
       ScheduledStretch scheduled;
       scheduled.joints = std::move(stretch);
       out.stretches.push_back(std::move(scheduled));
     }
-    if (machine_.recipe.schedule == "programmed") refuse_overloads(out.stretches);
-    if (machine_.recipe.schedule == "constant") lower_to_constant(out.stretches);
-    if (has_error(problems_)) return Result<FeedSchedule>::failure(std::move(problems_));
     std::vector<Found> found(out.stretches.size());
     if (!solve_all(out.stretches, found))
       return Result<FeedSchedule>::failure(
@@ -206,41 +184,6 @@ class Scheduler {
         cap);
   }
 
-  // The pieces of the stretch, cut where caps begin and end. `stretch` has to outlive it.
-  static FeedPath feed_path(const JointStretch& stretch, const std::vector<RateCap>& caps) {
-    FeedPath path;
-    std::vector<std::size_t> owner;
-    const double least = 1e-9 * stretch.length();
-    path.breaks = {stretch.breaks.front()};
-    std::size_t cap = 0;
-    for (std::size_t p = 0; p < stretch.pieces(); ++p) {
-      const double end = stretch.breaks[p + 1];
-      double at = stretch.breaks[p];
-      while (at < end) {
-        while (cap < caps.size() && caps[cap].to <= at + least) ++cap;
-        double to = end;
-        double rate = stretch.rate[p];
-        if (cap < caps.size()) {
-          if (caps[cap].from <= at + least) {
-            rate = std::min(rate, caps[cap].rate);
-            if (caps[cap].to < end - least) to = caps[cap].to;
-          } else if (caps[cap].from < end - least) {
-            to = caps[cap].from;
-          }
-        }
-        path.breaks.push_back(to);
-        path.feed.push_back(stretch.feed[p]);
-        path.rate.push_back(rate);
-        owner.push_back(p);
-        at = to;
-      }
-    }
-    path.jet = [&stretch, owner = std::move(owner)](std::size_t piece, double s) {
-      return stretch.jet(owner[piece], s);
-    };
-    return path;
-  }
-
   std::uint32_t line_at(const JointStretch& stretch, double s) const {
     return stretch.line[stretch.piece_at(s)];
   }
@@ -258,7 +201,7 @@ class Scheduler {
                            : "the programmed feed is not above 0";
         break;
       case FeedStatus::not_smooth:
-        why = "the path jumps by " + number(w.value) + " in its direction or curvature";
+        why = "the path jumps by " + four_digits(w.value) + " in its direction or curvature";
         break;
       case FeedStatus::not_finite:
         why = "a derivative of the joints is not finite";
@@ -268,52 +211,6 @@ class Scheduler {
     }
     return diagnostic("KN160", "there is no time law for the path here: " + why, in_.file_name,
                       static_cast<int>(line_at(stretch, w.s)));
-  }
-
-  // --- constant and programmed ---------------------------------------------------------------
-
-  bool in_cut(const JointStretch& stretch, const Cut& cut) const {
-    const std::uint32_t segment = samples_[stretch.first_sample + 1].segment;
-    return !cut.omitted && cut.first <= segment && segment <= cut.last;
-  }
-
-  void lower_to_constant(std::vector<ScheduledStretch>& stretches) {
-    for (const Cut& cut : in_.cuts) {
-      double feed = kInfinity;
-      for (const ScheduledStretch& s : stretches)
-        if (in_cut(s.joints, cut) && s.joints.length() > 0.0)
-          feed =
-              std::min(feed, largest_constant_feed(feed_path(s.joints, {}), limits_, kPlaces).feed);
-      for (ScheduledStretch& s : stretches)
-        if (in_cut(s.joints, cut))
-          for (double& f : s.joints.feed) f = std::min(f, feed);
-    }
-  }
-
-  void refuse_overloads(const std::vector<ScheduledStretch>& stretches) {
-    std::string text;
-    std::size_t count = 0;
-    std::uint32_t first_line = 0, last_line = 0;
-    for (const ScheduledStretch& s : stretches) {
-      if (!(s.joints.length() > 0.0)) continue;
-      for (const FeedOverload& o : overloads(feed_path(s.joints, {}), limits_, kPlaces)) {
-        if (o.kind == FeedOverload::Kind::none || o.factor <= 1.0 + 1e-9) continue;
-        const std::uint32_t line = s.joints.line[o.piece];
-        if (line == last_line) continue;
-        last_line = line;
-        if (first_line == 0) first_line = line;
-        if (++count > kMostTold) continue;
-        text += std::string(count > 1 ? "; " : "") + "line " + std::to_string(line) + ": axis " +
-                axis_name(o.joint) + " needs " + number(o.factor) + " times its " + word(o.kind);
-      }
-    }
-    if (count == 0) return;
-    if (count > kMostTold) text += "; and " + std::to_string(count - kMostTold) + " more lines";
-    problems_.push_back(diagnostic(
-        "KN152",
-        "the programmed feed cannot be kept (limits times tolerance.limit_share): " + text +
-            ". recipe.schedule = \"jerk\" slows down where it has to",
-        in_.file_name, static_cast<int>(first_line)));
   }
 
   // --- what was found --------------------------------------------------------------------------
@@ -477,7 +374,7 @@ Diagnostics schedule_notes(const FeedSchedule& schedule, const MachineDefinition
                        [](const SlowedBy& a, const SlowedBy& b) { return a.factor < b.factor; });
   if (slowest != schedule.slowed_by.end())
     add("slower than programmed on " + std::to_string(schedule.slowed_by.size()) +
-            " stretches, most here: " + number(100.0 * slowest->factor) +
+            " stretches, most here: " + four_digits(100.0 * slowest->factor) +
             " % of the feed, for the " + word(slowest->limit) + " limit of axis " +
             machine.axes[static_cast<std::size_t>(slowest->joint)].name +
             " (cuts[].slowed_by in the report has them all)",

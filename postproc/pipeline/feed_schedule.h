@@ -62,8 +62,9 @@ struct ScheduleInput {
 ///  - jerk: as fast as the limits allow, never above the programmed feed;
 ///  - constant: at most the largest constant feed of each cut that every joint's limits allow
 ///    (largest_constant_feed), with ramps at stops;
-///  - programmed: fails with KN152 where the programmed feed breaks a limit inside a stretch; ramps
-///    at stops.
+///  - programmed: the programmed feed, with ramps at stops. A blended corner that turns the tip by
+///    20° or more and cannot be passed at that feed becomes a stop in the middle of its blend;
+///    where else the feed breaks a limit, KN152 with lines, joints and factors.
 /// No block between two samples is shorter than cycle.min_block.
 /// Fails with KN160 where a stretch has no time law, with its witness.
 /// Stretches are solved on all threads (TBB) with the same result on any number; `progress` is only

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "kernels/core/contract.h"
 #include "kernels/core/units.h"
 
 namespace smoothpost {
@@ -136,6 +137,7 @@ class StretchBuilder {
 
   void finish(std::size_t last, StopCause cause) {
     if (last == now_.first_sample) return;
+    now_.path.join_pieces();
     now_.last_sample = last;
     now_.end = cause;
     out_.push_back(std::move(now_));
@@ -346,7 +348,7 @@ class StretchBuilder {
       }
       end_pieces(sub, place(shares[b]), rate_of(leg, extent));
     }
-    stop_if_rough(before, sub_before, leg_first_ - 1);
+    stop_if_rough(before, leg_first_ - 1);
     const double shift = now_.length() - extent - start;  // of s, when a new stretch began
     for (std::size_t i = leg_first_; i <= leg_last_; ++i)
       now_.sample_s.push_back(start + shift + share_of(i) * extent);
@@ -413,22 +415,11 @@ class StretchBuilder {
   }
 
   // The leg from piece `first` on was appended: does the path pass its start without a stop?
-  void stop_if_rough(std::size_t first, std::size_t first_sub, std::size_t sample) {
+  void stop_if_rough(std::size_t first, std::size_t sample) {
     if (first == 0 || !is_rough(first)) return;
-    JointStretch leg = now_;
-    const double start = leg.breaks[first];
-    drop_pieces(first, first_sub);
+    JointStretch leg = now_.cut_off(first, sample);
     finish(sample, StopCause::corner);
-    begin_at(sample);
-    now_.feed.assign(leg.feed.begin() + static_cast<std::ptrdiff_t>(first), leg.feed.end());
-    now_.rate.assign(leg.rate.begin() + static_cast<std::ptrdiff_t>(first), leg.rate.end());
-    now_.line.assign(leg.line.begin() + static_cast<std::ptrdiff_t>(first), leg.line.end());
-    now_.beam.assign(leg.beam.begin() + static_cast<std::ptrdiff_t>(first), leg.beam.end());
-    for (std::size_t p = first; p < leg.pieces(); ++p) {
-      now_.breaks.push_back(leg.breaks[p + 1] - start);
-      now_.sub_end.push_back(leg.sub_end[p] - static_cast<std::uint32_t>(first_sub));
-    }
-    now_.path = leg.path.tail(first_sub, start);
+    now_ = std::move(leg);
   }
 
   bool is_rough(std::size_t piece) const {
@@ -493,6 +484,39 @@ std::size_t JointStretch::piece_at(double s) const {
 JointVector JointStretch::joints_at(double s) const {
   if (planned) return planned->joints(s);
   return path.value(path.piece_at(s), s).head(joints);
+}
+
+JointStretch JointStretch::cut_off(std::size_t piece, std::size_t sample) {
+  require(!planned && piece > 0 && piece < pieces(), "cut_off: a piece inside");
+  const auto at = static_cast<std::ptrdiff_t>(piece);
+  const double start = breaks[piece];
+  const std::uint32_t sub = sub_end[piece - 1];
+  JointStretch rest;
+  rest.joints = joints;
+  rest.first_sample = sample;
+  rest.last_sample = last_sample;
+  rest.end = end;
+  rest.path = path.tail(sub, start);
+  for (std::size_t p = piece; p < breaks.size(); ++p) rest.breaks.push_back(breaks[p] - start);
+  for (std::size_t p = piece; p < pieces(); ++p) rest.sub_end.push_back(sub_end[p] - sub);
+  rest.sample_s = {0.0};
+  const std::size_t kept = sample - first_sample + 1;
+  for (std::size_t i = kept; i < sample_s.size(); ++i) rest.sample_s.push_back(sample_s[i] - start);
+  const auto move_tail = [at](auto& from, auto& to) {
+    to.assign(from.begin() + at, from.end());
+    from.resize(static_cast<std::size_t>(at));
+  };
+  move_tail(feed, rest.feed);
+  move_tail(rate, rest.rate);
+  move_tail(line, rest.line);
+  move_tail(beam, rest.beam);
+  path.shorten(sub);
+  breaks.resize(piece + 1);
+  sub_end.resize(piece);
+  sample_s.resize(std::min(sample_s.size(), kept));
+  last_sample = sample;
+  end = StopCause::corner;
+  return rest;
 }
 
 PathJet JointStretch::jet(std::size_t piece, double s) const {

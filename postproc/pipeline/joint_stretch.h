@@ -47,6 +47,10 @@ struct JointStretch {
   std::size_t piece_at(double s) const;
   JointVector joints_at(double s) const;
   PathJet jet(std::size_t piece, double s) const;
+
+  /// Ends the stretch at its piece `piece`, where sample `sample` of the plan stands; what is
+  /// behind is a stretch of its own with s from 0.   @pre nothing is planned, 0 < piece < pieces()
+  JointStretch cut_off(std::size_t piece, std::size_t sample);
 };
 
 struct StretchesInput {

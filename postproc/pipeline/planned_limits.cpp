@@ -51,8 +51,7 @@ Checks planned_limit_checks(const std::vector<JointPeaks>& peaks, double time,
 std::string planned_limits_assumption() {
   return "acceleration and jerk are those of the feed schedule, on the way between two stops of "
          "the path: at level geometry the control may move otherwise in time, and links are its "
-         "own. Where two pieces of the path's formula meet, the acceleration may step by up to "
-         "0.1 % of its limit, which is not counted as jerk";
+         "own";
 }
 
 }  // namespace smoothpost

@@ -12,13 +12,22 @@ namespace smoothpost {
 
 namespace {
 
-constexpr int kMillimetreDecimals = 7, kDegreeDecimals = 8;
+constexpr int kMillimetreDecimals = 7, kDegreeDecimals = 8, kMostDecimals = 9;
+constexpr double kRoundingShare = 0.05;  // of the jerk limit
+constexpr double kSameTime = 1e-9;       // s
+constexpr double kSameCycle = 1e-6;      // of a cycle
+
+double whole_cycles(double duration, double cycle) {
+  return cycle * std::ceil(duration / cycle - kSameCycle);
+}
 
 class TimelineBuilder {
  public:
   explicit TimelineBuilder(const TimelineInput& input)
       : in_(input), limits_(feed_limits(input.machine)) {
     out_.laws = input.schedule.stretches;
+    out_.cycle = input.machine.cycle.time;
+    for (ScheduledStretch& law : out_.laws) onto_cycles(law);
   }
 
   Timeline run() {
@@ -48,7 +57,8 @@ class TimelineBuilder {
   void act(const MachineAction& action, bool started) {
     double seconds = action.kind == MachineAction::Kind::dwell ? action.seconds : 0.0;
     if (action.kind == MachineAction::Kind::event) {
-      if (action.event.name == event_name::kBeamOn) beam_ = true;
+      if (action.event.name == event_name::kBeamOn || action.event.name == event_name::kPierce)
+        beam_ = true;
       if (action.event.name == event_name::kBeamOff) beam_ = false;
       for (const EventWords& row : in_.machine.process.events)
         if (row.event == action.event.name) seconds = row.dwell;
@@ -61,7 +71,14 @@ class TimelineBuilder {
     push(std::move(item));
   }
 
+  // Slower by less than a cycle, so that the law ends on one.
+  void onto_cycles(ScheduledStretch& law) const {
+    const double duration = law.duration();
+    if (duration > 0.0) law.slowing *= whole_cycles(duration, out_.cycle) / duration;
+  }
+
   void push(TimelineItem item) {
+    if (item.law < 0) item.duration = whole_cycles(item.duration, out_.cycle);
     item.start = out_.duration();
     item.beam = beam_;
     out_.items.push_back(std::move(item));
@@ -73,11 +90,13 @@ class TimelineBuilder {
     item.line = move.input_line;
     if (move.role == MoveRole::path) item.segment = move.segment;
     if (move.stretch >= 0) {
+      const auto k = static_cast<std::size_t>(move.stretch);
+      const double slower = out_.laws[k].slowing / in_.schedule.stretches[k].slowing;
       item.law = move.stretch;
       item.from = move.stretch == stretch_ ? reached_ : 0.0;
-      item.duration = move.stretch_time - item.from;
+      item.duration = slower * move.stretch_time - item.from;
       stretch_ = move.stretch;
-      reached_ = move.stretch_time;
+      reached_ = slower * move.stretch_time;
       return push(std::move(item));
     }
     ScheduledStretch law = straight(move, from);
@@ -88,6 +107,7 @@ class TimelineBuilder {
       return;
     }
     item.law = static_cast<std::int32_t>(out_.laws.size());
+    onto_cycles(law);
     item.duration = law.duration();
     out_.laws.push_back(std::move(law));
     push(std::move(item));
@@ -142,10 +162,10 @@ class TimelineBuilder {
 
 void append_row(std::string& text, const MachineDefinition& machine, const JointVector& q) {
   for (int j = 0; j < machine.size(); ++j) {
-    const bool rotary = machine.axes[static_cast<std::size_t>(j)].joint.kind == JointKind::rotary;
+    const AxisDefinition& axis = machine.axes[static_cast<std::size_t>(j)];
     text += ',';
-    append_decimal(text, rotary ? degrees_from_radians(q[j]) : q[j],
-                   rotary ? kDegreeDecimals : kMillimetreDecimals);
+    append_decimal(text, axis.joint.kind == JointKind::rotary ? degrees_from_radians(q[j]) : q[j],
+                   stream_decimals(axis, machine.cycle.time));
   }
 }
 
@@ -158,6 +178,20 @@ ScheduledStretch::Motion Timeline::at(const TimelineItem& item, double time) con
   return {item.stand, none, none, none};
 }
 
+std::size_t Timeline::item_at(double time, std::size_t from) const {
+  while (from + 1 < items.size() && items[from + 1].start <= time + kSameTime) ++from;
+  return from;
+}
+
+int stream_decimals(const AxisDefinition& axis, double cycle) {
+  const bool rotary = axis.joint.kind == JointKind::rotary;
+  const double limit = axis.jerk * (rotary ? kDegreesPerRadian : 1.0) * cycle * cycle * cycle;
+  int decimals = rotary ? kDegreeDecimals : kMillimetreDecimals;
+  while (decimals < kMostDecimals && 4.0 * std::pow(10.0, -decimals) > kRoundingShare * limit)
+    ++decimals;
+  return decimals;
+}
+
 Timeline timeline_of(const TimelineInput& input) { return TimelineBuilder(input).run(); }
 
 std::string trajectory_csv(const Timeline& timeline, const MachineDefinition& machine,
@@ -166,22 +200,22 @@ std::string trajectory_csv(const Timeline& timeline, const MachineDefinition& ma
   for (const auto& axis : machine.axes)
     text += "," + axis.name + (axis.joint.kind == JointKind::rotary ? "_deg" : "_mm");
   text += ",x_mm,y_mm,z_mm,i,j,k,beam\n";
-  const double cycle = machine.cycle.time;
-  const double end = timeline.duration();
+  if (timeline.items.empty()) return text;
+  const auto cycles = static_cast<long long>(std::llround(timeline.duration() / timeline.cycle));
   std::size_t at = 0;
-  for (long long k = 0; !timeline.items.empty(); ++k) {
-    const double t = static_cast<double>(k) * cycle;
-    while (at + 1 < timeline.items.size() && timeline.items[at + 1].start <= t) ++at;
-    const TimelineItem& item = timeline.items[at];
-    const JointVector q = timeline.at(item, std::min(t, end)).position;
+  for (long long k = 0; k <= cycles; ++k) {
+    const double t = static_cast<double>(k) * timeline.cycle;
+    at = timeline.item_at(t, at);
+    const JointVector q = timeline.at(timeline.items[at], t).position;
     append_decimal(text, t, 6);
     append_row(text, machine, q);
     const CutterLocation holder = forward_location(chain, q);
     const Vec3 tip = holder.tip - tool_length * holder.axis;
     for (int i = 0; i < 3; ++i) append_decimal(text += ',', tip[i], 6);
     for (int i = 0; i < 3; ++i) append_decimal(text += ',', holder.axis[i], 9);
-    text += item.beam && t < end ? ",1\n" : ",0\n";
-    if (t >= end) break;
+    // In force when the cycle behind the row ends.
+    const double last = t + (1.0 - kSameCycle) * timeline.cycle - kSameTime;
+    text += k < cycles && timeline.items[timeline.item_at(last, at)].beam ? ",1\n" : ",0\n";
   }
   return text;
 }

@@ -26,10 +26,14 @@ struct TimelineItem {
 struct Timeline {
   std::vector<ScheduledStretch> laws;  ///< first those of the schedule, in its order
   std::vector<TimelineItem> items;     ///< one behind the other; empty: not asked for
+  double cycle = 0.001;                ///< s, of the control: every rest lies on one
 
   double duration() const {
     return items.empty() ? 0.0 : items.back().start + items.back().duration;
   }
+  /// The last item that has begun at `time` (1e-9 s early counts), not before item `from`.
+  /// @pre items
+  std::size_t item_at(double time, std::size_t from = 0) const;
   /// Position, velocity, acceleration and jerk of every joint at a time in `item`.
   ScheduledStretch::Motion at(const TimelineItem& item, double time) const;
 };
@@ -45,14 +49,20 @@ struct TimelineInput {
 
 /// Every move of the program from the first one on behind which all joints are known. Moves that
 /// the schedule knows (MachineMove::stretch) follow it; others go straight, from rest to rest under
-/// the limits of feed_limits(), feeds not faster than their printed time. Cost: one small schedule
-/// for each of those.
+/// the limits of feed_limits(), feeds not faster than their printed time. Everything between two
+/// rests is slowed, and every dwell longer, by less than a cycle, so that rests lie on cycles.
+/// Guarantees (tests): items meet in position, velocity and acceleration; differences at 1 ms keep
+/// every limit. Cost: one small schedule for each move that the schedule does not know.
 Timeline timeline_of(const TimelineInput& input);
 
+/// Decimals of an axis in a joint stream (mm or deg): seven of a length and eight of an angle, more
+/// (nine at most) where half a digit of four rows, 4·10^−d/cycle³, were over 5 % of the jerk limit.
+int stream_decimals(const AxisDefinition& axis, double cycle);
+
 /// The joints at the machine's cycle time as CSV: `t_s`, one column per axis with its unit (X_mm,
-/// C_deg), then x_mm,y_mm,z_mm,i,j,k of the tool in the part and beam (0/1). Seven decimals of mm,
-/// eight of degrees: at 1 ms a rounding of half a digit is a jerk of 4·10⁻⁷/10⁻⁹ = 400 mm/s³.
-/// The last row is the first cycle at or behind the end.
+/// C_deg), then x_mm,y_mm,z_mm,i,j,k of the tool in the part and beam (0/1). Row k is the position
+/// at k cycles; its beam is that of the cycle behind it, and where the beam changes inside that
+/// cycle the new state, so up to a cycle early. The last row is the last cycle, at rest, beam 0.
 std::string trajectory_csv(const Timeline& timeline, const MachineDefinition& machine,
                            const ScrewChain& chain, double tool_length);
 

@@ -156,7 +156,7 @@ MotionRecord planned_record(const PageInput& in) {
   std::size_t at = 0;
   for (long long k = 0;; ++k) {
     const double t = std::min(static_cast<double>(k) * r.step, end);
-    while (at + 1 < timeline.items.size() && timeline.items[at + 1].start <= t) ++at;
+    at = timeline.item_at(t, at);
     const TimelineItem& item = timeline.items[at];
     const ScheduledStretch::Motion m = timeline.at(item, t);
     const std::array<const JointVector*, 4> values = {&m.position, &m.velocity, &m.acceleration,

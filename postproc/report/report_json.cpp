@@ -273,6 +273,33 @@ Json placement_json(const PlacementReport& placement) {
           {"after", margins(placement.after)}};
 }
 
+/// A joint stream with its own certificate: what is said of the program is not said of it, nor the
+/// other way round.
+Json stream_json(const JointStream& s, const ReportContext& context) {
+  Json checks = Json::array();
+  for (const Check& check : s.checks) checks.push_back(check_json(check));
+  Json axes = Json::array();
+  for (const StreamAxis& a : s.axes)
+    axes.push_back({{"name", a.name},
+                    {"unit", a.unit},
+                    {"peak",
+                     {{"velocity", number(a.velocity)},
+                      {"acceleration", number(a.acceleration)},
+                      {"jerk", number(a.jerk)}}},
+                    {"rounding_jerk", number(a.rounding_jerk)}});
+  return {{"file", context.stream_file},
+          {"sha256", context.stream_sha256},
+          {"verdict", s.ok() ? "certified" : "refused"},
+          {"level", "timed"},
+          {"cycle_s", number(s.cycle)},
+          {"rows", s.rows},
+          {"duration_s", number(s.duration)},
+          {"assumes", s.assumes},
+          {"not_checked", s.not_checked},
+          {"checks", std::move(checks)},
+          {"axes", std::move(axes)}};
+}
+
 }  // namespace
 
 std::string report_json(const Conversion& c, const ReportContext& context) {
@@ -336,8 +363,12 @@ std::string report_json(const Conversion& c, const ReportContext& context) {
   for (const LaserStretch& stretch : c.stretches)
     for (const DomainMap& map : stretch.clear.maps) maps.push_back(domain_json(map));
   if (!maps.empty()) j["domain_maps"] = std::move(maps);
-  j["time_s"] = {{"programmed", number(c.programmed_time)},
-                 {"scheduled", number(c.scheduled_time)}};
+  j["time_s"] = {
+      {"programmed", number(c.programmed_time)},
+      {"scheduled", number(c.scheduled_time)},
+      {"executed_estimate", c.executed.seconds ? number(*c.executed.seconds) : Json(nullptr)},
+      {"executed_model", c.executed.model}};
+  if (c.stream) j["stream"] = stream_json(*c.stream, context);
   if (context.placement) j["placement"] = placement_json(*context.placement);
   j["diagnostics"] = std::move(diagnostics);
   if (context.timings) {

@@ -37,6 +37,8 @@ struct ReportContext {
   std::vector<InputFile> input_files;  ///< besides it: what `check` compares with, and subroutines
   std::string program_sha256;
   std::string machine_sha256;
+  std::string stream_file;    ///< of --trajectory
+  std::string stream_sha256;  ///< of its text
   bool timings = false;
   std::optional<PlacementReport> placement;  ///< place, --work-offset auto
 };

@@ -9,7 +9,8 @@ interpreter_only stop after 2)
   2. LinuxCNC's interpreter accepts the program, and refuses it with any live G54 offset,
   3. the program runs to its end in the headless LinuxCNC that make_config.py makes of the machine,
   4. the executed poses and the program agree: tip 0.01 mm, axis 0.05 deg, blending included; every
-     row of the trajectory CSV was executed; its tips and axes are those of our forward kinematics,
+     row of the trajectory CSV was executed; its tips and axes are those of our forward kinematics;
+     it took as long as the report's executed_estimate says, to a twentieth,
   5. digital output 0 (the beam) is where the program wants it, never on in a rapid, off at the end,
   6. with a live G54 offset in the controller the program aborts before any joint has moved,
   7. where LinuxCNC has the input machine's kinematics, the input itself runs there in tool-centre-point
@@ -19,6 +20,7 @@ Prints every figure. Exit status: 0 all hold, 1 not, 2 usage, 77 LinuxCNC cannot
 import argparse
 import json
 import os
+import re
 import subprocess
 import sys
 
@@ -36,6 +38,7 @@ TOLERANCE = (0.01, 0.05)  # mm, deg
 OPERATOR_ERROR = 15       # exit status of headless_display.py
 BEAM_SWITCH = 0.004       # s, between a switch of the output and the joints' start
 LIVE_OFFSET = 0.25        # mm or deg
+ESTIMATE = 0.05           # of the executed time
 SAMPLES = "tests/acceptance/linuxcnc/samples"
 
 # The mills' home is far above the work; it is moved near, to keep the runs to seconds.
@@ -144,6 +147,7 @@ class Acceptance:
         log = Log(path, self.machine)
         self.control(log)
         self.beam(log)
+        self.estimate(log)
         trajectory = Trajectory(self.trajectory, self.machine)
         executed = compare_trajectory(log, self.machine, trajectory, TOLERANCE,
                                       self.case["tool_length"])
@@ -153,6 +157,29 @@ class Acceptance:
         axis_error = float(np.max(axis_angle_deg(axis, trajectory.axis)))
         self.that(tip_error < 1e-4 and axis_error < 1e-4,
                   f"CSV against our forward kinematics: {tip_error:.1e} mm, {axis_error:.1e} deg")
+
+    def estimate(self, log):
+        """The report's estimate counts from the first position that the program states whole."""
+        first = {}
+        with open(self.program, encoding="utf-8") as file:
+            for line in file:
+                text = re.sub(r"\(.*?\)", "", line)
+                if text.startswith("o") or "G53" in text:
+                    continue
+                for letter, value in re.findall(r"([A-Z])(-?[0-9.]+)", text):
+                    if letter in self.machine.letters:
+                        first[letter] = float(value)
+                if len(first) == len(self.machine.letters):
+                    break
+        wanted = np.array([first[axis.letter] for axis in self.machine.axes])
+        there = np.flatnonzero(np.all(np.abs(log.joints - wanted) < 1e-4, axis=1))
+        with open(self.json, encoding="utf-8") as file:
+            estimate = json.load(file)["time_s"]["executed_estimate"]
+        if not self.that(len(there) > 0 and estimate is not None, "a start and an estimate"):
+            return
+        executed = (log.moving().stop - 1 - there[0]) * 1e-3
+        self.that(abs(executed - estimate) <= ESTIMATE * executed,
+                  f"executed in {executed:.3f} s, estimated {estimate:.3f} s")
 
     def control(self, log):
         """The comparison itself is checked: a plan 3 tolerances beside in one axis must be over."""

@@ -159,3 +159,40 @@ TEST_CASE("chebyshev_path: jumps of value and slope between equal third derivati
       path.append_jets([](double) { return std::optional<ChebyshevJet>(); }, 1.0, 2.0, third, {}));
   CHECK(path.pieces() == 1);
 }
+
+TEST_CASE("chebyshev_path: joined pieces have no jump of the first two derivatives",
+          "[kernels][spline]") {
+  // Resolved so badly that the pieces miss each other.
+  const auto f = [](double x) { return vector2(100.0 + std::sin(40.0 * x), std::exp(3.0 * x)); };
+  ChebyshevPath path;
+  for (double to : {0.3, 0.5, 1.0}) REQUIRE(path.append(f, 0.0, to, {2e-3, 1e-4, 24}));
+  REQUIRE(path.pieces() >= 3);
+  ChebyshevPath joined = path;
+  joined.join_pieces();
+  double before = 0.0;
+  for (std::size_t i = 1; i < path.pieces(); ++i) {
+    const double x = path.from(i);
+    before = std::max(before, (path.jet(i - 1, x)[2] - path.jet(i, x)[2]).norm());
+    const ChebyshevJet left = joined.jet(i - 1, x), right = joined.jet(i, x);
+    CHECK((left[1] - right[1]).norm() < 1e-9);
+    CHECK((left[2] - right[2]).norm() < 1e-8);
+    // The mean of what was there, and the values as they were.
+    CHECK((left[2] - 0.5 * (path.jet(i - 1, x)[2] + path.jet(i, x)[2])).norm() < 1e-8);
+    CHECK((left[0] - path.jet(i - 1, x)[0]).norm() < 1e-11);
+    CHECK((right[0] - path.jet(i, x)[0]).norm() < 1e-11);
+    // What it costs in the third derivative.
+    for (int k = 0; k <= 50; ++k) {
+      const double y = path.from(i) + (path.to(i) - path.from(i)) * k / 50.0;
+      double bound = 0.0;  // of the jumps at both ends
+      for (const std::size_t b : {i, i + 1}) {
+        if (b >= path.pieces()) continue;
+        const ChebyshevJet l = path.jet(b - 1, path.from(b)), r = path.jet(b, path.from(b));
+        const double size = path.to(i) - path.from(i);
+        bound += 9.0 * 0.5 * (l[2] - r[2]).norm() / size +
+                 36.0 * 0.5 * (l[1] - r[1]).norm() / (size * size);
+      }
+      CHECK((joined.jet(i, y)[3] - path.jet(i, y)[3]).norm() <= bound + 1e-6);
+    }
+  }
+  CHECK(before > 1e-3);
+}

@@ -537,7 +537,8 @@ TEST_CASE("trajectory_csv: joints and tip at the cycle at the feed of the schedu
     REQUIRE(values.size() == 14);
     CHECK(values[7] == Approx(values[1] - 700).margin(1e-5));  // B = 0: tip follows X
     if (values[9] == Approx(1.0).margin(1e-9) && values[7] > 1.0 && values[7] < 9.0) {
-      if (last_x > 0) CHECK(values[7] - last_x == Approx(0.04).margin(2e-5));
+      // Slowed by less than a cycle in the cut's time of more than a second.
+      if (last_x > 0) CHECK(values[7] - last_x == Approx(0.04).epsilon(0.004));
       last_x = values[7];
       ++in_cut;
     }
