@@ -21,6 +21,7 @@ struct CommandLine {
   bool no_collision_check = false;
   bool timings = false;
   bool force = false;
+  bool in_place = false;
   std::string progress = "auto";
   std::string diagnostics = "text";
 };

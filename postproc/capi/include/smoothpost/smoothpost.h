@@ -123,6 +123,7 @@ typedef struct smoothpost_options {
   const char* normal_tolerance; /* finish: deg, of the tool axis against the surface's normal */
   const char* direction; /* finish: alternate | same | helical, of the layers */
   const char* stock_out; /* finish: a path for the STL of the body to be printed */
+  int in_place; /* convert: the program replaces the file `input`, only if it is certified */
 } smoothpost_options;
 
 /* All members to "not given". `size` is sizeof(smoothpost_options) as the caller knows it. */
