@@ -121,6 +121,7 @@ Options options_of(const smoothpost_options& o) {
   out.no_collision_check = o.no_collision_check != 0;
   out.timings = o.timings != 0;
   out.force = o.force != 0;
+  out.in_place = o.in_place != 0;
   return out;
 }
 

@@ -112,6 +112,7 @@ struct CallOptions {
     c.no_collision_check = l.no_collision_check;
     c.timings = l.timings;
     c.force = l.force;
+    c.in_place = l.in_place;
     if (l.input == "-") {
       input_bytes.assign(std::istreambuf_iterator<char>(std::cin), {});
       c.input_data = input_bytes.data();

@@ -175,6 +175,9 @@ void add_convert(CLI::App& app, CommandLine& l) {
   c->add_flag("--no-collision-check", l.no_collision_check,
               "leave the clearance of the machine's bodies unchecked");
   c->add_flag("--force", l.force, "write a refused program too, marked NOT CERTIFIED");
+  c->add_flag("--in-place", l.in_place,
+              "the program replaces the input file, which stays as it is when the program is "
+              "refused");
   add_output_options(c, l);
 }
 

@@ -22,6 +22,7 @@ struct CommandLine {
   bool timings = false;
   bool force = false;
   bool list = false;
+  bool in_place = false;
   std::string progress = "auto";
   std::string diagnostics = "text";
 };

@@ -179,6 +179,13 @@ class Run {
     for (const std::string& path : {options_.output, options_.json, options_.report,
                                     options_.line_map, options_.trajectory, options_.stock_out})
       add(check_target(path));
+    const bool other_target = !options_.output.empty() || options_.force;
+    if (options_.in_place && (options_.command != "convert" || options_.input == "-" ||
+                              options_.input_data || other_target))
+      add(usage_error(
+          "US195",
+          "--in-place puts the certified program of convert into the input file: name a "
+          "file, and leave out -o and --force"));
     return !has_error(result_.diagnostics);
   }
 
@@ -229,8 +236,8 @@ class Run {
     if (!options_.output.empty() && options_.output != "-" && !options_.input_data) {
       std::error_code error;
       if (fs::equivalent(options_.output, options_.input, error)) {
-        add(usage_error("US105",
-                        "-o " + options_.output + " is the input file: name another output"));
+        add(usage_error("US105", "-o " + options_.output +
+                                     " is the input file: name another output, or say --in-place"));
         return false;
       }
     }
@@ -648,8 +655,15 @@ class Run {
     write(options_.line_map, result_.line_map);
     write(options_.trajectory, result_.trajectory);
     if (result_.program.empty() || options_.output == "-") return;
-    result_.program_path = options_.output.empty() ? default_output() : options_.output;
+    // The input is only given up for a run without any fault, of its other files neither.
+    if (options_.in_place && result_.status != ExitStatus::certified) return;
+    result_.program_path = output_path();
     if (!write(result_.program_path, result_.program)) result_.program_path.clear();
+  }
+
+  std::string output_path() const {
+    if (options_.in_place) return options_.input;
+    return options_.output.empty() ? default_output() : options_.output;
   }
 
   // The input's stem in the working directory with the dialect's extension, never the input itself.

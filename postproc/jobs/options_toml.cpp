@@ -75,7 +75,8 @@ const std::map<std::string, bool Options::*>& switch_options() {
   static const std::map<std::string, bool Options::*> table = {
       {"no_collision_check", &Options::no_collision_check},
       {"timings", &Options::timings},
-      {"force", &Options::force}};
+      {"force", &Options::force},
+      {"in_place", &Options::in_place}};
   return table;
 }
 

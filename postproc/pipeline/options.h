@@ -71,6 +71,7 @@ struct Options {
   bool no_collision_check = false;
   bool timings = false;
   bool force = false;
+  bool in_place = false;  ///< convert: the program replaces the input file, if it is certified
 };
 
 }  // namespace smoothpost

@@ -135,6 +135,7 @@ typedef struct smoothpost_options {
   const char* worker; /* batch: the program that runs a job; default the smoothpost beside the
                          library */
   int list;           /* batch: names the jobs in the result's text, runs none */
+  int in_place; /* convert: the program replaces the file `input`, only if it is certified */
 } smoothpost_options;
 
 /* All members to "not given". `size` is sizeof(smoothpost_options) as the caller knows it. */
