@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 
 #include "postproc/jobs/files.h"
 #include "postproc/jobs/golden.h"
@@ -154,6 +155,57 @@ TEST_CASE("run_job: files are written, nothing on refusal but the report", "[pos
   o = mill();
   o.output = o.input;
   CHECK(status(run_job(o, {})) == 2);
+}
+
+TEST_CASE("run_job: in place a certified program replaces the file and a refused one leaves it",
+          "[postproc][jobs]") {
+  const fs::path folder = scratch("in place");
+  Options o = mill();
+  const std::string input = test::read_bytes(o.input);
+  o.output = (folder / "beside.ngc").string();
+  const JobResult beside = run_job(o, {});
+  REQUIRE(status(beside) == 0);
+
+  const fs::path file = folder / "part.ngc";
+  const auto start = [&] {
+    REQUIRE(write_file(file.string(), input).empty());
+    Options in_place = mill();
+    in_place.input = file.string();
+    in_place.output.clear();
+    in_place.in_place = true;
+    return in_place;
+  };
+  o = start();
+  const JobResult r = run_job(o, {});
+  CHECK(status(r) == 0);
+  CHECK(r.program_path == file.string());
+  CHECK(test::read_bytes(file) == r.program);
+  // The title names the input file; all else is the program that is written beside it.
+  const auto body = [](const std::string& text) { return text.substr(text.find("G21 ")); };
+  CHECK(body(r.program) == body(beside.program));
+
+  o = start();
+  o.tool.clear();
+  CHECK(status(run_job(o, {})) == 3);
+  CHECK(test::read_bytes(file) == input);
+  o = start();
+  o.json = (folder / "none" / "report.json").string();
+  CHECK(status(run_job(o, {})) == 2);
+  CHECK(test::read_bytes(file) == input);
+
+  const auto usage = [&](const std::function<void(Options&)>& change) {
+    Options wrong = start();
+    change(wrong);
+    const JobResult told = run_job(wrong, {});
+    CHECK(says(told, "US195", "--in-place"));
+    CHECK(status(told) == 2);
+    CHECK(test::read_bytes(file) == input);
+  };
+  usage([](Options& w) { w.force = true; });
+  usage([&](Options& w) { w.output = (folder / "other.ngc").string(); });
+  usage([](Options& w) { w.command = "check"; });
+  usage([&](Options& w) { w.input_data = input; });
+  CHECK(std::distance(fs::directory_iterator(folder), fs::directory_iterator()) == 2);
 }
 
 TEST_CASE("write_file: old content or new, through links, and a reason when it cannot",
