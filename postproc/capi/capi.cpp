@@ -93,6 +93,11 @@ Options options_of(const smoothpost_options& o) {
   out.normal_tolerance = text(o.normal_tolerance);
   out.direction = text(o.direction);
   out.stock_out = text(o.stock_out);
+  out.mill = text(o.mill);
+  out.steepest = text(o.steepest);
+  out.contours = text(o.contours);
+  out.unreachable = text(o.unreachable);
+  out.scale = text(o.scale);
   out.set = list(o.set, o.set_count);
   out.no_collision_check = o.no_collision_check != 0;
   out.timings = o.timings != 0;

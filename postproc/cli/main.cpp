@@ -121,6 +121,11 @@ struct CallOptions {
     c.normal_tolerance = or_null(l.normal_tolerance);
     c.direction = or_null(l.direction);
     c.stock_out = or_null(l.stock_out);
+    c.mill = or_null(l.mill);
+    c.steepest = or_null(l.steepest);
+    c.contours = or_null(l.contours);
+    c.unreachable = or_null(l.unreachable);
+    c.scale = or_null(l.scale);
     c.set = set.data();
     c.set_count = set.size();
     c.no_collision_check = l.no_collision_check;

@@ -61,6 +61,11 @@ struct Options {
   std::string normal_tolerance;  ///< finish: deg, of the tool axis against the surface's normal
   std::string direction;         ///< finish: alternate | same | helical, of the layers
   std::string stock_out;         ///< finish: a path for the STL of the body to be printed
+  std::string mill;              ///< finish: R,L: radius and free length of the end mill, mm
+  std::string steepest;          ///< finish: deg, walls farther from upright are left out
+  std::string contours;          ///< finish: all | outer
+  std::string unreachable;       ///< finish: refuse | leave-out
+  std::string scale;             ///< finish: a factor of the part's size
   std::vector<std::string> set;  ///< section.key=value
   bool no_collision_check = false;
   bool timings = false;

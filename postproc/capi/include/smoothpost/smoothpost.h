@@ -123,6 +123,11 @@ typedef struct smoothpost_options {
   const char* normal_tolerance; /* finish: deg, of the tool axis against the surface's normal */
   const char* direction; /* finish: alternate | same | helical, of the layers */
   const char* stock_out; /* finish: a path for the STL of the body to be printed */
+  const char* mill; /* finish: R,L: radius and free length of the end mill, mm */
+  const char* steepest; /* finish: deg, walls farther from upright are left out */
+  const char* contours; /* finish: all | outer */
+  const char* unreachable; /* finish: refuse | leave-out */
+  const char* scale; /* finish: a factor of the part's size */
 } smoothpost_options;
 
 /* All members to "not given". `size` is sizeof(smoothpost_options) as the caller knows it. */
