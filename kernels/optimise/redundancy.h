@@ -174,7 +174,7 @@ struct SmoothFree {
 /// σ''' about the last pass (Gauss-Newton), joints' positions and rates as rows, |Δσ| ≤ trust. A
 /// step that does not lower the true objective, or leaves a limit, is halved. Guarantees (tests):
 /// never above the seed's spline; limits; ends; KKT of the last programme; on paper C's ellipse at
-/// least 40 % below minimum norm at equal closure. Cost: passes × (28 jets a piece + a programme).
+/// least 40 % below minimum norm at equal closure. Cost: passes × (20 jets a piece + a programme).
 /// @pre sizes fit, seed covers the path
 SmoothFree smooth_free(const RedundantPath& path, const FreeProfile& seed, const JointVector& near,
                        const SmoothFreeSettings& settings);

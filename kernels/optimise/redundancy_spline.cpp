@@ -153,28 +153,34 @@ class SplineSearch {
     return true;
   }
 
+  // With q = F(s, σ):  q' = ... + F_σ·σ',  q'' = ... + F_σ·σ'',  and q''' = ... + 3·N·σ'' +
+  // F_σ·σ''' with N = F_sσ + F_σσ·σ', which also is what q' changes by with σ, and half of what q''
+  // does with σ'. So a step of σ'' alone, in which all is linear, tells all but three columns.
   std::optional<Linear> linear_at(double s, const Jet& free, const JointVector& last) const {
     Linear out;
-    const auto at = [&](std::size_t k, double step) {
-      Jet moved = free;
-      moved[k] += step;
-      return path_.jet(s, moved, last);
-    };
     const auto q = path_.jet(s, free, last);
     if (!q) return {};
     out.q = *q;
+    const auto moved = [&](std::size_t k, double step) -> std::optional<JointJet> {
+      Jet there = free;
+      there[k] += step;
+      auto jet = path_.jet(s, there, q->col(0));
+      if (jet) *jet = (*jet - *q) / step;
+      return jet;
+    };
+    const auto by_second = moved(2, 1.0);
+    const auto by_first = moved(1, kDifference);
+    const auto by_value = moved(0, kDifference);
+    if (!by_second || !by_first || !by_value) return {};
     for (auto& m : out.by) m.setZero(q->rows(), 4);
-    for (std::size_t k = 0; k < 4; ++k) {
-      // By σ'' and σ''' linear: any step is exact.
-      const double step = k < 2 ? kDifference : 1.0;
-      const auto above = at(k, step);
-      const auto below = at(k, -step);
-      if (!above || !below) return {};
-      for (std::size_t r = k; r < 4; ++r)
-        out.by[r].col(static_cast<Eigen::Index>(k)) =
-            (above->col(static_cast<Eigen::Index>(r)) - below->col(static_cast<Eigen::Index>(r))) /
-            (2.0 * step);
-    }
+    for (std::size_t r = 0; r < 4; ++r)
+      out.by[r].col(static_cast<Eigen::Index>(r)) = by_second->col(2);
+    out.by[1].col(0) = by_second->col(3) / 3.0;
+    out.by[2].col(1) = by_second->col(3) * (2.0 / 3.0);
+    out.by[3].col(2) = by_second->col(3);
+    out.by[3].col(1) = by_first->col(3);
+    out.by[2].col(0) = by_value->col(2);
+    out.by[3].col(0) = by_value->col(3);
     return out;
   }
 

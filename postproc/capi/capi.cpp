@@ -117,6 +117,11 @@ Options options_of(const smoothpost_options& o) {
   out.only = text(o.only);
   out.worker = text(o.worker);
   out.list = o.list != 0;
+  out.mill = text(o.mill);
+  out.steepest = text(o.steepest);
+  out.contours = text(o.contours);
+  out.unreachable = text(o.unreachable);
+  out.scale = text(o.scale);
   out.set = list(o.set, o.set_count);
   out.no_collision_check = o.no_collision_check != 0;
   out.timings = o.timings != 0;

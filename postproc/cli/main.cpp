@@ -107,6 +107,11 @@ struct CallOptions {
     c.only = or_null(l.only);
     c.worker = or_null(l.worker);
     c.list = l.list;
+    c.mill = or_null(l.mill);
+    c.steepest = or_null(l.steepest);
+    c.contours = or_null(l.contours);
+    c.unreachable = or_null(l.unreachable);
+    c.scale = or_null(l.scale);
     c.set = set.data();
     c.set_count = set.size();
     c.no_collision_check = l.no_collision_check;

@@ -93,7 +93,7 @@ void add_output_options(CLI::App* app, CommandLine& l) {
 
 void add_part_options(CLI::App* app, CommandLine& l) {
   app->add_option("-w,--workpiece", l.workpiece, "the part: an STL in the program's coordinates");
-  app->add_option("--workpiece-unit", l.workpiece_unit, "unit of the STL: mm | inch");
+  app->add_option("--workpiece-unit", l.workpiece_unit, "unit of the STL: mm | cm | m | inch");
   app->add_option(
          "--work-offset", l.work_offset,
          "G54=x,y,z[,a,b,c]: the program's zero on the output machine, mm and deg; convert: "
@@ -188,9 +188,10 @@ void add_finish(CLI::App& app, CommandLine& l) {
       ->required();
   add_machine_options(c, l);
   c->add_option("-o,--output", l.output, "the program; - for standard output");
-  c->add_option("--workpiece-unit", l.workpiece_unit, "unit of the STL: mm | inch");
+  c->add_option("--workpiece-unit", l.workpiece_unit, "unit of the STL: mm | cm | m | inch");
   c->add_option("--work-offset", l.work_offset,
-                "G54=x,y,z[,a,b,c]: the part's zero in the machine's workpiece frame, mm and deg")
+                "G54=x,y,z[,a,b,c]: the part's zero in the machine's workpiece frame, mm and deg | "
+                "auto: over its middle, as low as can be reached")
       ->take_all()
       ->allow_extra_args(false);
   c->add_option("--pitch", l.pitch, "between layers, mm; default 1");
@@ -206,6 +207,16 @@ void add_finish(CLI::App& app, CommandLine& l) {
                 "that the smoothed tool axis may leave the normal by, deg; default 1");
   c->add_option("--direction", l.direction, "of the layers: alternate (default) | same | helical");
   c->add_option("--stock-out", l.stock_out, "write the body to be printed to FILE.stl");
+  c->add_option("--mill", l.mill,
+                "R,L: radius of the end mill's ball end and its length in front of the machine's "
+                "bodies, mm; default 1.5,30");
+  c->add_option("--steepest", l.steepest,
+                "leave out walls whose normal is farther from level, deg; default 80");
+  c->add_option("--contours", l.contours,
+                "all (default) | outer: none that lies inside of another");
+  c->add_option("--unreachable", l.unreachable,
+                "refuse (default) | leave-out: what the machine cannot reach, on your word");
+  c->add_option("--scale", l.scale, "factor of the part's size; default 1");
   c->add_option("--tool", l.tool, "N=length: what the end mill is longer than the machine's, mm")
       ->take_all()
       ->allow_extra_args(false);

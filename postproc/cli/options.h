@@ -15,8 +15,8 @@ struct CommandLine {
       input_format, input_dialect, input_machine, run_budget, call_depth, process, tip_tolerance,
       axis_tolerance, lead, tilt, smoothing, orientation, optimise, schedule, links, cuts, against,
       json, report, plots, pitch, depth, feed, rpm, from, to, lead_in, normal_tolerance, direction,
-      stock_out, trajectory, line_map, integer_unit, jobs, only, worker, box, turn, input_unit,
-      input_feed, cl_frames, cl_circles;
+      stock_out, mill, steepest, contours, unreachable, scale, trajectory, line_map, integer_unit,
+      jobs, only, worker, box, turn, input_unit, input_feed, cl_frames, cl_circles;
   std::vector<std::string> work_offset, input_work_offset, tool, set;
   bool no_collision_check = false;
   bool timings = false;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <exception>
 #include <filesystem>
+#include <map>
 
 #include "formats/mesh/stl_reader.h"
 #include "kernels/core/contract.h"
@@ -134,16 +135,21 @@ class Run {
   // The part, the path along its walls, and the stock in the part's place.
   bool read_finish_input(ConvertInput& in, FinishPath& path) {
     std::optional<TriangleMesh> part;
-    const auto settings = read_finish_options(options_, machine_.definition.tolerance.tip,
-                                              machine_.definition.tolerance.axis);
-    add(settings.diagnostics());
-    const auto placement = read_placement(std::nullopt);
-    if (!settings.ok() || !placement || !read_mesh(input_bytes_, input_name_, part)) return false;
+    const auto request = read_finish_options(options_, machine_.definition.tolerance.tip,
+                                             machine_.definition.tolerance.axis);
+    add(request.diagnostics());
+    FinishOnMachine on{machine_.definition, {}, input_name_, !options_.no_collision_check};
+    if (!automatic()) {
+      on.placement = read_placement(std::nullopt);
+      if (!on.placement) return false;
+    }
+    if (!request.ok() || !read_mesh(input_bytes_, input_name_, part)) return false;
     context_.input_format = "stl";
-    auto made = make_finish_path(*part, settings.value(), input_name_, progress_);
+    auto made = make_placed_finish(*part, request.value(), on, progress_);
     add(made.diagnostics());
     if (!made.ok()) return false;
-    path = std::move(made.value());
+    PlacedFinish& placed = made.value();
+    path = std::move(placed.path);
     if (!options_.stock_out.empty()) {
       const std::string stock = stl_bytes(path.stock);
       const Diagnostics errors = write_file(options_.stock_out, stock);
@@ -155,11 +161,12 @@ class Run {
     in.input.reference = "the walls of " + base_name(input_name_) + ", " +
                          std::to_string(path.layers.size()) + " layers";
     in.input.lines = path.path.points.size();
-    in.input.assumes.push_back("the part as it was printed is the stock, the part offset by " +
-                               decimal(settings.value().depth, 3) +
-                               " mm; input lines count the points of the path");
-    in.placement = *placement;
-    in.placement_text = placement_text_;
+    for (std::string& text : placed.assumes) in.input.assumes.push_back(std::move(text));
+    for (const Diagnostic& d : made.diagnostics())
+      if (d.code == "RG141" || d.code == "RG142" || d.code == "RG143")
+        in.input.assumes.push_back(d.text);
+    in.placement = placed.placement;
+    in.placement_text = automatic() ? placed.placement_text : placement_text_;
     in.part = path.stock;
     in.part_name = input_name_;
     return complete(in);
@@ -440,7 +447,7 @@ class Run {
   std::optional<Pose> read_placement(std::optional<int> system) {
     if (automatic()) {
       if (options_.command == "convert") return Pose::Identity();
-      add(usage_error("US122", "--work-offset auto is for convert alone: give G54=x,y,z"));
+      add(usage_error("US122", "--work-offset auto is for convert and finish: give G54=x,y,z"));
       return {};
     }
     const auto offsets = read_offsets(options_.work_offset, "--work-offset");
@@ -498,13 +505,15 @@ class Run {
   bool read_mesh(const std::string& bytes, const std::string& name,
                  std::optional<TriangleMesh>& part) {
     StlSettings settings;
-    if (options_.workpiece_unit == "inch") {
-      settings.scale = kMillimetresPerInch;
-    } else if (!options_.workpiece_unit.empty() && options_.workpiece_unit != "mm") {
-      add(usage_error("US145",
-                      "--workpiece-unit " + options_.workpiece_unit + ": expected is mm or inch"));
+    const std::map<std::string, double> units{
+        {"", 1.0}, {"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"inch", kMillimetresPerInch}};
+    const auto unit = units.find(options_.workpiece_unit);
+    if (unit == units.end()) {
+      add(usage_error("US145", "--workpiece-unit " + options_.workpiece_unit +
+                                   ": expected is mm, cm, m or inch"));
       return false;
     }
+    settings.scale = unit->second;
     const auto stl = read_stl(bytes, name, settings);
     add(stl.diagnostics());
     if (!stl.ok()) return false;

@@ -57,7 +57,12 @@ const std::map<std::string, std::string Options::*>& text_options() {
       {"lead_in", &Options::lead_in},
       {"normal_tolerance", &Options::normal_tolerance},
       {"direction", &Options::direction},
-      {"stock_out", &Options::stock_out}};
+      {"stock_out", &Options::stock_out},
+      {"mill", &Options::mill},
+      {"steepest", &Options::steepest},
+      {"contours", &Options::contours},
+      {"unreachable", &Options::unreachable},
+      {"scale", &Options::scale}};
   return table;
 }
 

@@ -13,14 +13,13 @@ constexpr double kAtSample = 0.05;  // of the spacing: a corner that near to a s
 class Splitter {
  public:
   Splitter(const SampledContour& contour, const std::vector<SurfacePoint>& samples,
-           double& left_out)
-      : in_(contour), all_(samples), left_out_(left_out) {}
+           double& too_short)
+      : in_(contour), all_(samples), too_short_(too_short) {}
 
   std::vector<ContourPiece> run() {
     const std::size_t count = all_.size() - 1;
     for (std::size_t i = 0; i <= count; ++i) {
-      if (too_flat(all_[i], in_.steepest)) {
-        left_out_ += i < count ? in_.spacing : 0.0;
+      if (in_.out[i]) {
         finish();
         continue;
       }
@@ -60,7 +59,7 @@ class Splitter {
     if (way >= kShortestPiece)
       pieces_.push_back(std::move(now_));
     else
-      left_out_ += way;
+      too_short_ += way;
     now_ = ContourPiece{};
   }
 
@@ -79,7 +78,7 @@ class Splitter {
 
   const SampledContour& in_;
   const std::vector<SurfacePoint>& all_;
-  double& left_out_;
+  double& too_short_;
   ContourPiece now_;
   std::vector<ContourPiece> pieces_;
 };
@@ -103,35 +102,50 @@ bool too_flat(const SurfacePoint& point, double steepest) {
 }
 
 std::vector<ContourPiece> split_contour(const SampledContour& contour,
-                                        std::vector<SurfacePoint> samples, double& left_out) {
+                                        std::vector<SurfacePoint> samples, double& too_short) {
   if (samples.size() < 2) return {};
-  Splitter splitter(contour, samples, left_out);
+  Splitter splitter(contour, samples, too_short);
   bool whole = contour.closed;
   for (std::size_t i = 0; whole && i + 1 < samples.size(); ++i)
-    whole = !splitter.is_corner(i) && !too_flat(samples[i], contour.steepest);
+    whole = !splitter.is_corner(i) && !contour.out[i];
   if (!whole) return splitter.run();
   std::vector<ContourPiece> one;
   one.push_back({std::move(samples), true});
   return one;
 }
 
-std::vector<SurfacePoint> with_leads(const std::vector<SurfacePoint>& samples, double radius,
-                                     double spacing) {
-  std::vector<SurfacePoint> out;
+std::vector<SurfacePoint> lead_of(const std::vector<SurfacePoint>& samples, double radius,
+                                  double spacing, bool at_end) {
+  const SurfacePoint& end = at_end ? samples.back() : samples.front();
+  const Vec3 direction = tangent(samples, at_end);
   const auto steps = static_cast<int>(std::ceil(0.5 * kPi * radius / spacing));
-  const auto add = [&](const SurfacePoint& at, const Vec3& direction, int from, int to,
-                       double side) {
-    for (int k = from; k < to; ++k) {
-      const double angle = 0.5 * kPi * (side < 0.0 ? steps - k : k) / steps;
-      out.push_back({at.point + radius * (1.0 - std::cos(angle)) * at.normal +
-                         side * radius * std::sin(angle) * direction,
-                     at.normal, false});
-    }
-  };
-  add(samples.front(), tangent(samples, false), 0, steps, -1.0);
-  out.insert(out.end(), samples.begin(), samples.end());
-  add(samples.back(), tangent(samples, true), 1, steps + 1, 1.0);
+  const double side = at_end ? 1.0 : -1.0;
+  std::vector<SurfacePoint> out;
+  for (int k = 0; k < steps; ++k) {
+    const double angle = 0.5 * kPi * (at_end ? k + 1 : steps - k) / steps;
+    out.push_back({end.point + radius * (1.0 - std::cos(angle)) * end.normal +
+                       side * radius * std::sin(angle) * direction,
+                   end.normal, false});
+  }
   return out;
+}
+
+std::optional<std::size_t> sharpest(const std::vector<SurfacePoint>& samples) {
+  std::optional<std::size_t> found;
+  double most = 0.0;
+  for (std::size_t i = 2; i + 1 < samples.size(); ++i) {
+    const auto way = [&](std::size_t k) {
+      const Vec3 d = samples[k].point - samples[k - 1].point;
+      return d.norm() > kNoWay ? Vec3(d.normalized()) : Vec3(Vec3::Zero());
+    };
+    double turn = angle_between(samples[i - 1].normal, samples[i].normal);
+    const Vec3 a = way(i - 1), b = way(i + 1);
+    if (!a.isZero() && !b.isZero()) turn += angle_between(a, b);
+    if (!(turn > most)) continue;
+    most = turn;
+    found = i;
+  }
+  return found;
 }
 
 }  // namespace smoothpost

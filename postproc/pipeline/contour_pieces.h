@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "kernels/core/units.h"
@@ -34,19 +35,25 @@ struct SampledContour {
   bool closed = false;
   double start = 0.0;     ///< mm: the place of the first sample
   double spacing = 0.25;  ///< mm
-  double steepest = 0.0;  ///< rad
+  std::vector<bool> out;  ///< one a sample: not to be cut
 };
 
-/// Parts a sampled contour at corners and where its wall is too flat. Next to a corner a piece goes
-/// on to the corner itself. `samples`: one at start, start + spacing … once round or to the end; of
-/// a closed contour the last is the first again. What is left out is added to `left_out`, mm.
+/// Parts a sampled contour at corners and where samples are out. Next to a corner a piece goes on
+/// to the corner itself. `samples`: one at start, start + spacing … once round or to the end; of a
+/// closed contour the last is the first again. The length of pieces that are too short is added to
+/// `too_short`, mm.
 std::vector<ContourPiece> split_contour(const SampledContour& contour,
-                                        std::vector<SurfacePoint> samples, double& left_out);
+                                        std::vector<SurfacePoint> samples, double& too_short);
 
-/// The samples with quarters of circles of `radius` before and behind them, in the plane of
-/// direction and normal, tangent to the contour, with the normal of the end that they lead to.
-/// @pre at least two samples
-std::vector<SurfacePoint> with_leads(const std::vector<SurfacePoint>& samples, double radius,
-                                     double spacing);
+/// A quarter of a circle of `radius` that leads to the first sample (`at_end`: from the last one
+/// away), in the plane of direction and normal, tangent to the contour, with that sample's normal;
+/// without the sample itself.
+/// @pre at least two samples, radius > 0
+std::vector<SurfacePoint> lead_of(const std::vector<SurfacePoint>& samples, double radius,
+                                  double spacing, bool at_end);
+
+/// The place i at which samples i − 1 and i differ most in normal and direction: where a piece that
+/// no smooth curve follows is to be parted. Of a piece of three samples or fewer nothing.
+std::optional<std::size_t> sharpest(const std::vector<SurfacePoint>& samples);
 
 }  // namespace smoothpost

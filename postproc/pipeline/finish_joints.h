@@ -2,6 +2,7 @@
 
 #include "kernels/kinematics/rotary_pair.h"
 #include "kernels/optimise/redundancy.h"
+#include "kernels/spline/chebyshev_path.h"
 #include "kernels/spline/spline_jets.h"
 #include "postproc/pipeline/finish_path.h"
 #include "postproc/pipeline/planned_path.h"
@@ -16,11 +17,13 @@ inline LocationJet holder_on_cut(const FinishCut& cut, double tool_length, doubl
   return at;
 }
 
-/// A cut's joints: its curves, and the free joint's spline.
+/// A cut's joints: its curves, and the free joint's spline. joints() and tool() are exact; jet() is
+/// their polynomials' (ChebyshevPath), which is what the schedule asks for very often, where those
+/// come within `third` (one a joint, by s) of the third derivatives, else exact, too.
 class FinishJoints : public PlannedPath {
  public:
   FinishJoints(const FinishCut& cut, const RotaryPair& pair, double tool_length,
-               const SmoothFree& free, JointVector near)
+               const SmoothFree& free, JointVector near, const JointVector& third)
       : cut_(cut),
         pair_(pair),
         free_(free.free),
@@ -28,7 +31,15 @@ class FinishJoints : public PlannedPath {
         near_(std::move(near)),
         path_(redundant_path(
             pair_, [this, tool_length](double s) { return holder_on_cut(cut_, tool_length, s); },
-            {0.0, cut.length()})) {}
+            {0.0, cut.length()})) {
+    const std::vector<double> all = breaks();
+    for (std::size_t i = 1; i < all.size(); ++i)
+      if (!table_.append_jets([this](double s) { return values(s); }, all[i - 1], all[i], third,
+                              {})) {
+        table_.shorten(0);
+        return;
+      }
+  }
   FinishJoints(const FinishJoints&) = delete;
   FinishJoints& operator=(const FinishJoints&) = delete;
 
@@ -44,7 +55,14 @@ class FinishJoints : public PlannedPath {
     return path_.joints(inside(s), free_at(s)[0], near_).value_or(near_);
   }
   JointJet jet(double s) const override {
-    const auto q = path_.jet(inside(s), free_at(s), near_);
+    s = inside(s);
+    if (table_.pieces() > 0) {
+      const ChebyshevJet found = table_.jet(table_.piece_at(s), s);
+      JointJet out(near_.size(), 4);
+      for (std::size_t r = 0; r < 4; ++r) out.col(static_cast<Eigen::Index>(r)) = found[r];
+      return out;
+    }
+    const auto q = path_.jet(s, free_at(s), near_);
     if (q) return *q;
     JointJet none = JointJet::Zero(near_.size(), 4);
     none.col(0) = near_;
@@ -57,6 +75,13 @@ class FinishJoints : public PlannedPath {
   }
 
  private:
+  std::optional<ChebyshevJet> values(double s) const {
+    const auto q = path_.jet(inside(s), free_at(s), near_);
+    if (!q) return {};
+    ChebyshevJet out;
+    for (std::size_t r = 0; r < 4; ++r) out[r] = q->col(static_cast<Eigen::Index>(r));
+    return out;
+  }
   Jet free_at(double s) const {
     const auto jet = free_.jet(inside(s) / scale_, scale_);
     return {jet(0), jet(1), jet(2), jet(3)};
@@ -69,6 +94,7 @@ class FinishJoints : public PlannedPath {
   const double scale_;  // mm of s a unit of free_
   const JointVector near_;
   const RedundantPath path_;
+  ChebyshevPath table_;  // of jets; empty: none
 };
 
 }  // namespace smoothpost

@@ -1,45 +1,49 @@
 #include "postproc/pipeline/finish_path.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "kernels/core/process.h"
 #include "kernels/core/units.h"
 #include "kernels/geometry/offset_body.h"
+#include "kernels/geometry/refine_surface.h"
 #include "kernels/geometry/slicing.h"
 #include "kernels/geometry/surface_normal.h"
 #include "kernels/geometry/triangle_tree.h"
-#include "kernels/optimise/tip_fit.h"
+#include "kernels/geometry/turn_outwards.h"
 #include "postproc/pipeline/contour_pieces.h"
+#include "postproc/pipeline/finish_told.h"
 
 namespace smoothpost {
 
 namespace {
 
-constexpr double kNoisy = 0.001;     // mm, of the typical residual: the mesh is a scan
-constexpr double kNoisyMost = 0.15;  // mm of noise that are a scan's at most
-constexpr double kNoisyShare = 0.6;  // of the residual of two rings that one has in a scan
-constexpr double kDepthShare = 0.1;  // of the depth, that it may be off
-constexpr double kLeastStep = 0.2;   // of the step, between samples
-constexpr int kMostHalvings = 6;     // of the way between two samples
+constexpr double kNoisy = 0.001;         // mm, of the typical residual: the mesh is a scan
+constexpr double kNoisyMost = 0.15;      // mm of noise that are a scan's at most
+constexpr double kNoisyShare = 0.6;      // of the residual of two rings that one has in a scan
+constexpr double kSagShare = 0.02;       // of the depth, that the stock's sides may be off
+constexpr double kLeastStep = 0.2;       // of the step, between samples
+constexpr std::size_t kMillStride = 2;   // samples from one look at the mill to the next
+constexpr std::size_t kReachStride = 4;  // likewise at the machine
+constexpr int kMostHalvings = 6;         // of the way between two samples
+constexpr std::array<double, 3> kLeadShares{1.0, 0.5, 0.25};
 constexpr std::size_t kMostPoints = 5'000'000;
 
-std::string number(double value, int digits = 3) {
-  double scale = 1.0;
-  for (int i = 0; i < digits; ++i) scale *= 10.0;
-  std::string text = std::to_string(std::round(value * scale) / scale);
-  while (text.back() == '0') text.pop_back();
-  if (text.back() == '.') text.pop_back();
-  return text;
-}
+std::string number(double value, int digits = 3) { return finish_number(value, digits); }
 
-Diagnostic told(Severity severity, const char* code, std::string text, const std::string& file) {
-  Diagnostic d;
-  d.severity = severity;
-  d.code = code;
-  d.text = std::move(text);
-  d.where.file = file;
-  return d;
+/// The spindle on at the first point, off at the last.
+void add_events(const std::string& rpm, ToolPath& path) {
+  PathEvent on;
+  on.point = 0;
+  on.event.name = event_name::kSpindleOn;
+  on.event.parameters = {{"rpm", rpm}};
+  on.line = on.event.line = 1;
+  PathEvent off;
+  off.point = path.points.size() - 1;
+  off.event.name = event_name::kSpindleOff;
+  off.line = off.event.line = path.points.back().line;
+  path.events = {on, off};
 }
 
 class FinishPlanner {
@@ -61,6 +65,11 @@ class FinishPlanner {
     auto layers = slice_surface(surface_, slices);
     add(layers.diagnostics());
     if (!layers.ok()) return fail();
+    if (turn_outwards(surface_, *tree_, layers.value()) > 0) {
+      auto turned = build_triangle_tree(surface_.mesh);
+      if (!turned.ok()) return fail();
+      tree_.emplace(std::move(turned.value()));
+    }
     choose_normals();
     if (!make_stock()) return fail();
     if (settings_.helical && !add_helix(layers.value())) return fail();
@@ -70,19 +79,18 @@ class FinishPlanner {
                      static_cast<double>(k + 1) / static_cast<double>(layers.value().size())))
         return cancelled();
     }
+    add(finish_warnings(settings_, out_.layers, found_, file_));
     if (out_.cuts.empty()) {
-      diagnostics_.push_back(
-          told(Severity::error, "RG132",
-               "nothing to finish between " + number(slices.first) + " and " + number(slices.last) +
-                   " mm: the part is " + number(report.min.z()) + " to " + number(report.max.z()) +
-                   " mm high" +
-                   (out_.layers.empty() ? "" : ", and its walls there are too flat or too short"),
-               file_));
+      diagnostics_.push_back(finish_message(
+          Severity::error, "RG132",
+          "nothing to finish between " + number(slices.first) + " and " + number(slices.last) +
+              " mm: the part is " + number(report.min.z()) + " to " + number(report.max.z()) +
+              " mm high" + (out_.layers.empty() ? "" : ", and nothing of its walls there is left"),
+          file_));
       return fail();
     }
-    tell();
-    add_checks();
-    add_events();
+    out_.checks = finish_checks(settings_, found_);
+    add_events(number(settings_.rpm, 0), out_.path);
     return Result<FinishPath>(std::move(out_), std::move(diagnostics_));
   }
 
@@ -95,7 +103,8 @@ class FinishPlanner {
   }
   Result<FinishPath> fail() { return Result<FinishPath>::failure(std::move(diagnostics_)); }
   Result<FinishPath> cancelled() {
-    return Result<FinishPath>::failure(told(Severity::error, "US190", "cancelled", file_));
+    return Result<FinishPath>::failure(
+        finish_message(Severity::error, "US190", "cancelled", file_));
   }
 
   // Of a scan two rings are fitted, and residuals of its noise are no reason not to.
@@ -111,21 +120,23 @@ class FinishPlanner {
   }
 
   bool make_stock() {
-    OffsetBody body = offset_body(surface_, settings_.depth);
+    RefineSettings settings;
+    settings.tolerance = std::max(kSagShare * settings_.depth, 3.0 * normals_->settings().noise);
+    const OrientedSurface fine = refine_surface(surface_, *normals_, settings);
+    auto nominal = build_triangle_tree(fine.mesh);
+    add(nominal.diagnostics());
+    if (!nominal.ok()) return false;
+    fine_.emplace(std::move(nominal.value()));
+    mill_.emplace(*fine_, settings_.mill);
+    OffsetBody body = offset_body(fine, settings_.depth);
     auto built = build_triangle_tree(body.mesh);
     add(built.diagnostics());
     if (!built.ok()) return false;
     stock_.emplace(std::move(built.value()));
-    if (body.folded.count > 0)
-      diagnostics_.push_back(
-          told(Severity::warning, "RG135",
-               "the stock " + number(settings_.depth) + " mm outside the part folds at " +
-                   std::to_string(body.folded.count) + " triangles, first at triangle " +
-                   std::to_string(body.folded.triangles.front() + 1) +
-                   ": the part is too hollow there for that depth. The depth of cut is measured "
-                   "in the stock as it is",
-               file_));
+    found_.folded = body.folded.count;
+    if (body.folded.count > 0) found_.first_folded = body.folded.triangles.front();
     out_.stock = std::move(body.mesh);
+    if (settings_.reach_with) reach_ = settings_.reach_with(out_.stock);
     return true;
   }
 
@@ -148,14 +159,17 @@ class FinishPlanner {
     layer.height = slice.height;
     layer.contours = slice.contours.size();
     for (const SliceContour& contour : slice.contours) {
-      open_ += !contour.closed;
-      against_ += contour.against_mesh;
+      if (settings_.outer_only && contour.depth > 0) {
+        ++found_.inner;
+        continue;
+      }
+      found_.open += !contour.closed;
+      found_.against += contour.against_mesh;
       layer.length += length(contour);
       for (ContourPiece& piece : pieces_of(contour, layer)) {
         if (settings_.alternate && index % 2 == 1)
           std::reverse(piece.samples.begin(), piece.samples.end());
-        if (!add_cut(std::move(piece), index)) return false;
-        ++layer.cuts;
+        if (!add_cuts(std::move(piece), index, layer)) return false;
       }
     }
     out_.layers.push_back(layer);
@@ -163,10 +177,11 @@ class FinishPlanner {
   }
 
   bool no_helix(double height, const char* why) {
-    diagnostics_.push_back(told(Severity::error, "RG139",
-                                "no helix goes round the part at " + number(height) + " mm: " +
-                                    why + ". Choose layers (--direction alternate or same)",
-                                file_));
+    diagnostics_.push_back(finish_message(Severity::error, "RG139",
+                                          "no helix goes round the part at " + number(height) +
+                                              " mm: " + why +
+                                              ". Choose layers (--direction alternate or same)",
+                                          file_));
     return false;
   }
 
@@ -178,8 +193,8 @@ class FinishPlanner {
         return no_helix(slice.height, "there is not one closed contour");
       lines.emplace_back(slice.contours[0]);
       starts.push_back(seam(lines.back()));
-      against_ += slice.contours[0].against_mesh;
-      out_.layers.push_back({slice.height, 1, 0, lines.back().length(), 0.0});
+      found_.against += slice.contours[0].against_mesh;
+      out_.layers.push_back({slice.height, 1, 0, lines.back().length(), {}});
     }
     if (slices.empty()) return true;
     ContourPiece piece;
@@ -203,14 +218,13 @@ class FinishPlanner {
           return no_helix(at.z(), "it has an edge there");
       }
     }
-    out_.layers.front().cuts = 1;
-    return add_cut(std::move(piece), 0);
+    return add_cuts(std::move(piece), 0, out_.layers.front());
   }
 
   std::vector<ContourPiece> pieces_of(const SliceContour& contour, FinishLayer& layer) {
     const ContourLine line(contour);
     if (line.length() < kShortestPiece) {
-      layer.left_out += line.length();
+      layer.left_out.too_short += line.length();
       return {};
     }
     const double start = contour.closed ? seam(line) : 0.0;
@@ -228,8 +242,46 @@ class FinishPlanner {
       }
       all.push_back(sample_at(line.at(place(i)), line.direction(place(i))));
     }
-    return split_contour({line, contour.closed, start, h, settings_.steepest}, std::move(all),
-                         layer.left_out);
+    std::vector<bool> out = places_out(all, h, layer.left_out);
+    return split_contour({line, contour.closed, start, h, std::move(out)}, std::move(all),
+                         layer.left_out.too_short);
+  }
+
+  // Samples that no cut may have, each for the first reason that there is.
+  std::vector<bool> places_out(const std::vector<SurfacePoint>& all, double spacing,
+                               LeftOut& left_out) const {
+    std::vector<bool> out(all.size(), false);
+    const auto look = [&](std::size_t stride, double& length, const auto& fits) {
+      std::vector<bool> bad(all.size(), false);
+      for (std::size_t k = 0; k < all.size() + stride - 1; k += stride) {
+        const std::size_t i = std::min(k, all.size() - 1);
+        if (out[i] || fits(all[i])) continue;
+        // From behind the last place that fits, up to the next one.
+        const std::size_t from = i < stride ? 0 : i - stride + 1;
+        std::fill(bad.begin() + static_cast<std::ptrdiff_t>(from),
+                  bad.begin() + static_cast<std::ptrdiff_t>(std::min(i + stride, all.size())),
+                  true);
+      }
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        if (!bad[i] || out[i]) continue;
+        out[i] = true;
+        if (i + 1 < all.size()) length += spacing;
+      }
+    };
+    look(1, left_out.flat,
+         [this](const SurfacePoint& p) { return !too_flat(p, settings_.steepest); });
+    look(kMillStride, left_out.buried,
+         [this](const SurfacePoint& p) { return !buried(*fine_, p); });
+    look(kMillStride, left_out.mill, [this](const SurfacePoint& p) { return has_room(p); });
+    if (reach_)
+      look(kReachStride, left_out.reach, [this](const SurfacePoint& p) {
+        return reach_({p.point, p.normal});
+      });
+    return out;
+  }
+
+  bool has_room(const SurfacePoint& at) const {
+    return mill_->room(at) >= -kMillShare * settings_.depth;
   }
 
   // Where a closed contour starts: next to the start before it.
@@ -260,86 +312,123 @@ class FinishPlanner {
     return out;
   }
 
-  bool add_cut(ContourPiece piece, std::size_t layer) {
+  /// The lead of one end, as large as the mill has room for; an open piece is shortened there by up
+  /// to the smallest one. Nothing: there is no room.
+  std::optional<std::vector<SurfacePoint>> lead_at(ContourPiece& piece, bool at_end,
+                                                   LeftOut& left_out) const {
+    if (!(settings_.lead > 0.0)) return std::vector<SurfacePoint>();
+    const double smallest = kLeadShares.back() * settings_.lead;
+    const auto most = static_cast<std::size_t>(std::ceil(smallest / settings_.step)) + 2;
+    for (std::size_t dropped = 0;; ++dropped) {
+      for (const double share : kLeadShares) {
+        auto lead = lead_of(piece.samples, share * settings_.lead, settings_.step, at_end);
+        if (std::all_of(lead.begin(), lead.end(),
+                        [this](const SurfacePoint& p) { return has_room(p); }))
+          return lead;
+      }
+      if (piece.closed || dropped == most || piece.samples.size() < 6) return {};
+      const auto& s = piece.samples;
+      left_out.mill += at_end ? (s[s.size() - 1].point - s[s.size() - 2].point).norm()
+                              : (s[1].point - s[0].point).norm();
+      if (at_end)
+        piece.samples.pop_back();
+      else
+        piece.samples.erase(piece.samples.begin());
+    }
+  }
+
+  static double length_of(const std::vector<SurfacePoint>& samples) {
+    double sum = 0.0;
+    for (std::size_t i = 1; i < samples.size(); ++i)
+      sum += (samples[i].point - samples[i - 1].point).norm();
+    return sum;
+  }
+
+  // The cut of a piece, or those of its parts.
+  bool add_cuts(ContourPiece piece, std::size_t layer, FinishLayer& told_in) {
+    std::vector<ContourPiece> open;
+    open.push_back(std::move(piece));
+    while (!open.empty()) {
+      ContourPiece now = std::move(open.back());
+      open.pop_back();
+      ContourPiece whole = now;
+      if (now.closed) {
+        // Over the start once more.
+        const auto again = std::min(now.samples.size() - 1,
+                                    static_cast<std::size_t>(settings_.overlap / settings_.step));
+        for (std::size_t i = 1; i <= again; ++i) now.samples.push_back(now.samples[i]);
+      }
+      const auto lead = lead_at(now, false, told_in.left_out);
+      const auto away = lead_at(now, true, told_in.left_out);
+      if (!lead || !away) {
+        told_in.left_out.mill += length_of(now.samples);
+        continue;
+      }
+      std::vector<SurfacePoint> samples = *lead;
+      samples.insert(samples.end(), now.samples.begin(), now.samples.end());
+      samples.insert(samples.end(), away->begin(), away->end());
+      samples = apart(samples);
+      if (samples.size() < 2) continue;
+      if (out_.path.points.size() + samples.size() > kMostPoints) {
+        diagnostics_.push_back(finish_message(
+            Severity::error, "RG138",
+            "more than " + std::to_string(kMostPoints) + " path points: choose a larger pitch",
+            file_));
+        return false;
+      }
+      auto cut =
+          smooth_cut(samples, {settings_.tip_tolerance, settings_.axis_tolerance, settings_.step});
+      if (!cut && settings_.helical) return no_curve(samples[samples.size() / 2].point);
+      if (!cut) {
+        part_where_sharp(std::move(whole), open, told_in.left_out);
+        continue;
+      }
+      cut->layer = layer;
+      cut->closed = now.closed;
+      add_points(samples, *cut);
+      out_.cuts.push_back(std::move(*cut));
+      ++told_in.cuts;
+    }
+    return true;
+  }
+
+  // The second part of a piece goes onto `open` before the first, which is to be cut first.
+  void part_where_sharp(ContourPiece piece, std::vector<ContourPiece>& open, LeftOut& left_out) {
+    const auto at = sharpest(piece.samples);
+    const double length = length_of(piece.samples);
+    if (!at || length < 2.0 * kShortestPiece) {
+      left_out.rough += length;
+      return;
+    }
+    ++found_.parted;
+    std::vector<SurfacePoint>& s = piece.samples;
+    const auto middle = static_cast<std::ptrdiff_t>(*at);
     if (piece.closed) {
-      // Over the start once more.
-      const auto again = std::min(piece.samples.size() - 1,
-                                  static_cast<std::size_t>(settings_.overlap / settings_.step));
-      for (std::size_t i = 1; i <= again; ++i) piece.samples.push_back(piece.samples[i]);
+      // Opened there: no edge, but no smooth curve either.
+      s.pop_back();
+      std::rotate(s.begin(), s.begin() + middle, s.end());
+      open.push_back({std::move(s), false});
+      return;
     }
-    const std::vector<SurfacePoint> samples =
-        apart(with_leads(piece.samples, settings_.lead, settings_.step));
-    if (samples.size() < 2) return true;
-    FinishCut cut;
-    cut.layer = layer;
-    cut.closed = piece.closed;
-    cut.s.push_back(0.0);
-    for (std::size_t i = 1; i < samples.size(); ++i) {
-      cut.s.push_back(cut.s.back() + (samples[i].point - samples[i - 1].point).norm());
-      const Vec3& a = samples[i - 1].normal;
-      const Vec3& b = samples[i].normal;
-      cut.turning += std::atan2(a.x() * b.y() - a.y() * b.x(), a.x() * b.x() + a.y() * b.y());
+    ContourPiece second{{s.begin() + middle, s.end()}, false};
+    s.resize(*at);
+    for (ContourPiece* part : {&second, &piece}) {
+      const double way = length_of(part->samples);
+      if (way < kShortestPiece)
+        left_out.rough += way;
+      else
+        open.push_back(std::move(*part));
     }
-    if (out_.path.points.size() + samples.size() > kMostPoints) {
-      diagnostics_.push_back(
-          told(Severity::error, "RG138",
-               "more than " + std::to_string(kMostPoints) + " path points: choose a larger pitch",
-               file_));
-      return false;
-    }
-    if (!smooth(samples, cut)) return false;
-    add_points(samples, cut);
-    out_.cuts.push_back(std::move(cut));
-    return true;
   }
 
-  static bool fit(const std::vector<double>& u, std::vector<Vec3> points, int spans,
-                  double tolerance, SplineJets<3>& curve) {
-    TipFitProblem problem;
-    problem.knots = clamped_knots(5, spans);
-    problem.u = u;
-    problem.points = std::move(points);
-    problem.tolerance = tolerance;
-    problem.hybrid = false;
-    problem.explain = false;
-    TipFit found = fit_tip(problem);
-    if (found.failed >= 0) return false;
-    curve = SplineJets<3>(found.curve);
-    return true;
-  }
-
-  bool smooth(const std::vector<SurfacePoint>& samples, FinishCut& cut) {
-    std::vector<Vec3> points, normals;
-    for (const SurfacePoint& s : samples) {
-      points.push_back(s.point);
-      normals.push_back(s.normal);
-    }
-    const bool finite = std::all_of(samples.begin(), samples.end(), [](const SurfacePoint& s) {
-      return s.point.allFinite() && s.normal.allFinite();
-    });
-    for (const double piece : {2.0, 1.0, 0.5, 0.25}) {
-      if (!finite) break;
-      const int spans =
-          std::max(6, static_cast<int>(std::ceil(cut.length() / std::max(piece, settings_.step))));
-      cut.scale = cut.length() / spans;
-      cut.pieces = spans;
-      std::vector<double> u;
-      for (const double s : cut.s) u.push_back(std::min(s / cut.scale, static_cast<double>(spans)));
-      u.back() = spans;
-      // The normalised axis is off by no more than the components are.
-      if (fit(u, points, spans, settings_.tip_tolerance, cut.tip) &&
-          fit(u, normals, spans, 0.98 * settings_.axis_tolerance, cut.axis))
-        return true;
-    }
-    diagnostics_.push_back(told(Severity::error, "RG133",
-                                "the contour at " + number(samples[samples.size() / 2].point.x()) +
-                                    ", " + number(samples[samples.size() / 2].point.y()) + ", " +
-                                    number(samples[samples.size() / 2].point.z()) +
-                                    " mm cannot be smoothed within " +
-                                    number(settings_.tip_tolerance, 4) + " mm and " +
-                                    number(degrees_from_radians(settings_.axis_tolerance)) +
-                                    " deg: allow more, or mend the mesh there",
-                                file_));
+  bool no_curve(const Vec3& at) {
+    diagnostics_.push_back(finish_message(
+        Severity::error, "RG133",
+        "the contour at " + number(at.x()) + ", " + number(at.y()) + ", " + number(at.z()) +
+            " mm cannot be smoothed within " + number(settings_.tip_tolerance, 4) + " mm and " +
+            number(degrees_from_radians(settings_.axis_tolerance)) +
+            " deg: allow more, or mend the mesh there",
+        file_));
     return false;
   }
 
@@ -365,7 +454,7 @@ class FinishPlanner {
     for (std::size_t i = 0; i < samples.size(); ++i) {
       if (i > 0) add_between(cut, cut.s[i - 1], cut.s[i], 0, places);
       places.push_back(cut.s[i]);
-      measure(samples[i], cut.location(cut.s[i]));
+      measure(samples[i], cut.location(cut.s[i]), i % kMillStride == 0);
     }
     Vec3 before = Vec3::Zero();
     for (const double s : places) {
@@ -383,118 +472,31 @@ class FinishPlanner {
     cut.s = std::move(places);
   }
 
-  // What smoothing has done to a sample, and how deep it lies in the stock.
-  void measure(const SurfacePoint& sample, const LocationJet& at) {
-    moved_ = std::max(moved_, (at.tip.col(0) - sample.point).norm());
-    turned_ = std::max(turned_, angle_between(at.axis.col(0), sample.normal));
-    if (!sample.on_contour) return;
-    const double depth = -stock_->closest(at.tip.col(0)).signed_distance;
-    least_ = std::min(least_, depth);
-    greatest_ = std::max(greatest_, depth);
-    sum_ += depth;
-    ++measured_;
-  }
-
-  void tell() {
-    double length = 0.0, left_out = 0.0;
-    for (const FinishLayer& layer : out_.layers) {
-      length += layer.length;
-      left_out += layer.left_out;
-    }
-    const auto warn = [this](const char* code, std::string text) {
-      diagnostics_.push_back(told(Severity::warning, code, std::move(text), file_));
-    };
-    if (left_out > 1e-3)
-      warn("RG134", number(left_out, 1) + " of " + number(length, 1) +
-                        " mm of contours are left out: their walls are steeper than " +
-                        number(degrees_from_radians(settings_.steepest)) +
-                        " deg against the machine's reach of the tool axis, or pieces between "
-                        "edges are shorter than " +
-                        number(kShortestPiece) + " mm");
-    if (open_ > 0)
-      warn("RG136", std::to_string(open_) +
-                        " contours are open: the mesh has holes there, and the body is taken to be "
-                        "on the side that its triangles say");
-    if (against_ > 0)
-      warn("RG137", std::to_string(against_) +
-                        " contours have triangles wound the wrong way round: the outside is taken "
-                        "from how contours lie in each other");
-  }
-
-  void add_checks() {
-    Check depth;
-    depth.name = "depth_of_cut";
-    depth.unit = "mm";
-    depth.value = std::max(greatest_ - settings_.depth, settings_.depth - least_);
-    depth.limit = kDepthShare * settings_.depth;
-    depth.ok = depth.value <= depth.limit;
-    depth.planned = true;
-    depth.note = "depth of cut along the contours, in the stock: least " + number(least_) +
-                 ", mean " +
-                 number(sum_ / static_cast<double>(std::max<std::size_t>(measured_, 1))) +
-                 ", greatest " + number(greatest_) + " mm; asked for " + number(settings_.depth);
-    Check moved;
-    moved.name = "contour_deviation";
-    moved.unit = "mm";
-    moved.value = moved_;
-    moved.limit = settings_.tip_tolerance;
-    moved.ok = moved_ <= moved.limit * (1.0 + 1e-6);
-    moved.planned = true;
-    Check turned;
-    turned.name = "axis_to_normal";
-    turned.unit = "deg";
-    turned.value = degrees_from_radians(turned_);
-    turned.limit = degrees_from_radians(settings_.axis_tolerance);
-    turned.ok = turned_ <= settings_.axis_tolerance * (1.0 + 1e-6);
-    turned.planned = true;
-    out_.checks = {depth, moved, turned};
-  }
-
-  void add_events() {
-    PathEvent on;
-    on.point = 0;
-    on.event.name = event_name::kSpindleOn;
-    on.event.parameters = {{"rpm", number(settings_.rpm, 0)}};
-    on.line = on.event.line = 1;
-    PathEvent off;
-    off.point = out_.path.points.size() - 1;
-    off.event.name = event_name::kSpindleOff;
-    off.line = off.event.line = out_.path.points.back().line;
-    out_.path.events = {on, off};
+  // What smoothing has done to a sample, how deep it lies in the stock, and the mill in the part.
+  void measure(const SurfacePoint& sample, const LocationJet& at, bool with_mill) {
+    const Vec3 tip = at.tip.col(0), axis = at.axis.col(0);
+    found_.moved = std::max(found_.moved, (tip - sample.point).norm());
+    found_.turned = std::max(found_.turned, angle_between(axis, sample.normal));
+    if (with_mill) found_.room = std::min(found_.room, mill_->room({tip, axis, false}));
+    if (sample.on_contour) found_.depth.add(depth_in(*stock_, tip, axis));
   }
 
   const FinishSettings& settings_;
   const std::string& file_;
   const Progress& progress_;
   OrientedSurface surface_;
-  std::optional<TriangleTree> tree_, stock_;
+  std::optional<TriangleTree> tree_, fine_, stock_;
+  std::optional<MillFit> mill_;  // on fine_
+  ReachTest reach_;
   std::optional<SurfaceNormals> normals_;
   std::uint32_t hint_ = 0;
   std::optional<Vec3> seam_;
-  std::size_t open_ = 0, against_ = 0, measured_ = 0;
-  double least_ = INFINITY, greatest_ = -INFINITY, sum_ = 0.0;
-  double moved_ = 0.0, turned_ = 0.0;
+  FinishFindings found_;
   Diagnostics diagnostics_;
   FinishPath out_;
 };
 
 }  // namespace
-
-LocationJet FinishCut::location(double place) const {
-  LocationJet out{tip.jet(place / scale, scale), axis.jet(place / scale, scale)};
-  Jet square{};
-  for (std::size_t r = 0; r < 4; ++r)
-    for (std::size_t k = 0; k <= r; ++k)
-      square[r] += kLeibniz[r][k] * out.axis.col(static_cast<Eigen::Index>(k))
-                                        .dot(out.axis.col(static_cast<Eigen::Index>(r - k)));
-  Jet root{};
-  root[0] = std::sqrt(square[0]);
-  root[1] = square[1] / (2.0 * root[0]);
-  root[2] = (square[2] - 2.0 * root[1] * root[1]) / (2.0 * root[0]);
-  root[3] = (square[3] - 6.0 * root[1] * root[2]) / (2.0 * root[0]);
-  out.axis = product(reciprocal(root), out.axis);
-  return out;
-}
 
 Result<FinishPath> make_finish_path(const TriangleMesh& part, const FinishSettings& settings,
                                     const std::string& file_name, const Progress& progress) {

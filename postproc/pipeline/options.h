@@ -63,6 +63,11 @@ struct Options {
   std::string normal_tolerance;  ///< finish: deg, of the tool axis against the surface's normal
   std::string direction;         ///< finish: alternate | same | helical, of the layers
   std::string stock_out;         ///< finish: a path for the STL of the body to be printed
+  std::string mill;              ///< finish: R,L: radius and free length of the end mill, mm
+  std::string steepest;          ///< finish: deg, walls farther from upright are left out
+  std::string contours;          ///< finish: all | outer
+  std::string unreachable;       ///< finish: refuse | leave-out
+  std::string scale;             ///< finish: a factor of the part's size
   std::vector<std::string> set;  ///< section.key=value
   std::string jobs;              ///< batch: how many run at a time
   std::string only;              ///< batch: the one job to run, in this process

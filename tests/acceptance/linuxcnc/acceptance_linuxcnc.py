@@ -4,7 +4,7 @@
     acceptance_linuxcnc.py CASE --smoothpost TOOL --source ROOT --work DIR
 
 CASE is a row of CASES: an input program is converted with the built tool, then (cases with
-interpreter_only stop after 2)
+interpreter_only stop after 2; those with seconds run the beginning, and leave the CSV out)
   1. the tool certifies it (exit status 0, verdict certified),
   2. LinuxCNC's interpreter accepts the program, and refuses it with any live G54 offset,
   3. the program runs to its end in the headless LinuxCNC that make_config.py makes of the machine,
@@ -41,6 +41,29 @@ LIVE_OFFSET = 0.25        # mm or deg
 ESTIMATE = 0.05           # of the executed time
 SAMPLES = "tests/acceptance/linuxcnc/samples"
 
+
+def elliptic_part(path, a=20.0, b=14.0, height=40.2, around=96, up=20):
+    """An elliptic cylinder as an ASCII STL."""
+    def at(i, k):
+        turn = 2.0 * np.pi * (i % around) / around
+        return a * np.cos(turn), b * np.sin(turn), height * k / up
+    triangles = []
+    for i in range(around):
+        for k in range(up):
+            corners = at(i, k), at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)
+            triangles += [corners[:3], (corners[0], corners[2], corners[3])]
+        triangles += [(at(i + 1, 0), at(i, 0), (0.0, 0.0, 0.0)),
+                      (at(i, up), at(i + 1, up), (0.0, 0.0, height))]
+    with open(path, "w", encoding="ascii") as file:
+        file.write("solid part\n")
+        for corners in triangles:
+            file.write("facet normal 0 0 0\nouter loop\n")
+            for corner in corners:
+                file.write("vertex " + " ".join(f"{value:.6f}" for value in corner) + "\n")
+            file.write("endloop\nendfacet\n")
+        file.write("endsolid part\n")
+
+
 # The mills' home is far above the work; it is moved near, to keep the runs to seconds.
 MILL = {"input": f"{SAMPLES}/mill_short.ngc", "input_machine": "table_table_ac",
         "options": ["--tool", "1=50"], "tool_length": 50.0,
@@ -58,6 +81,10 @@ CASES = {
                            "input_machine": "laser_5p1", "machine": "laser_5p1",
                            "options": ["--work-offset", "G54=700,600,1000"], "set": {},
                            "interpreter_only": True},
+    # A whole part of 40 layers is finished; the machine runs the first seconds of its program.
+    "finish_first_seconds": {"command": "finish", "make_input": elliptic_part,
+                             "machine": "finish_2p2r_1p1r", "options": ["--work-offset", "auto"],
+                             "tool_length": 0.0, "set": {}, "seconds": 20.0},
 }
 
 
@@ -101,11 +128,16 @@ class Acceptance:
 
     def convert(self):
         case = self.case
-        command = [self.tool, "convert", os.path.join(self.source, case["input"]),
-                   "-m", self.machine_file(case["machine"]),
-                   "--input-machine", self.machine_file(case["input_machine"]),
-                   "-o", self.program, "--json", self.json, "--trajectory", self.trajectory,
+        if "make_input" in case:
+            source = os.path.join(self.work, "part.stl")
+            case["make_input"](source)
+        else:
+            source = os.path.join(self.source, case["input"])
+        command = [self.tool, case.get("command", "convert"), source,
+                   "-m", self.machine_file(case["machine"]), "-o", self.program, "--json", self.json, "--trajectory", self.trajectory,
                    "--progress", "none", *case["options"]]
+        if "input_machine" in case:
+            command += ["--input-machine", self.machine_file(case["input_machine"])]
         for key, value in case["set"].items():
             command += ["--set", f"{key}={value}"]
         for path in (self.program, self.trajectory, self.json):
@@ -118,7 +150,23 @@ class Acceptance:
             return False
         with open(self.json, encoding="utf-8") as file:
             verdict = json.load(file).get("verdict")
-        return self.that(verdict == "certified", f"verdict {verdict}")
+        if not self.that(verdict == "certified", f"verdict {verdict}"):
+            return False
+        if "seconds" in case:
+            self.shorten(case["seconds"])
+        return True
+
+    def shorten(self, seconds):
+        """Ends the program with the block in which its moves at feed have lasted so long."""
+        moves = JointProgram(self.program, self.machine.letters, self.machine.home()).moves
+        lasted = np.cumsum([move.duration for move in moves])
+        count = int(np.searchsorted(lasted, seconds)) + 1
+        self.that(count < len(moves), f"the first {seconds:g} s are {count} of {len(moves)} moves, "
+                                      f"which last {lasted[-1]:.0f} s")
+        with open(self.program, encoding="ascii") as file:
+            lines = file.readlines()[:moves[min(count, len(moves)) - 1].line]
+        with open(self.program, "w", encoding="ascii") as file:
+            file.writelines(lines + ["M5 M9\n", "M2\n"])
 
     def interpreter(self):
         checker = interpreter_check.Checker(self.machine, {}, {})
@@ -147,6 +195,8 @@ class Acceptance:
         log = Log(path, self.machine)
         self.control(log)
         self.beam(log)
+        if "seconds" in self.case:  # the CSV is that of the whole program
+            return
         self.estimate(log)
         trajectory = Trajectory(self.trajectory, self.machine)
         executed = compare_trajectory(log, self.machine, trajectory, TOLERANCE,

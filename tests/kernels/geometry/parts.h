@@ -34,6 +34,23 @@ inline Soup ellipse_body(double a, double b, double height, int nu, int nv) {
   return soup;
 }
 
+/// The prism from z = 0 to `height` on an outline that runs counter-clockwise and whose first point
+/// sees all of it.
+inline Soup prism(const std::vector<Vec3>& outline, double height) {
+  Soup soup;
+  const Vec3 up(0, 0, height);
+  const std::size_t n = outline.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec3& a = outline[i];
+    const Vec3& b = outline[(i + 1) % n];
+    for (const Vec3& c : {a, b, Vec3(b + up), a, Vec3(b + up), Vec3(a + up)}) soup.push_back(c);
+    if (i == 0 || i + 1 == n) continue;
+    for (const Vec3& c : {Vec3(outline[0] + up), Vec3(a + up), Vec3(b + up), outline[0], b, a})
+      soup.push_back(c);
+  }
+  return soup;
+}
+
 inline Soup turned_over(Soup soup) {
   for (std::size_t i = 0; i < soup.size(); i += 3) std::swap(soup[i + 1], soup[i + 2]);
   return soup;

@@ -9,6 +9,8 @@
 #include "examples/paper_c/paper_paths.h"
 #include "kernels/core/contract.h"
 #include "kernels/core/units.h"
+#include "kernels/kinematics/six_r.h"
+#include "tests/kernels/kinematics/arms.h"
 #include "tests/kernels/kinematics/reference_machines.h"
 
 using namespace smoothpost;
@@ -187,6 +189,160 @@ TEST_CASE("redundant_path: every value of the free joint is exact",
   none.joints.back().redundant = false;
   CHECK(redundant_joint(chain) == 5);
   CHECK(redundant_joint(none) == -1);
+}
+
+// The kernel knows joints and their derivatives only: other machines than paper C's, a rail and a
+// robot's turn about its tool.
+TEST_CASE("minimum_norm: a rail under a tilting table", "[kernels][optimise]") {
+  ScrewChain chain = test::table_table_ac();
+  ChainJoint rail;
+  rail.kind = JointKind::linear;
+  rail.side = ChainSide::tool;
+  rail.direction = Vec3::UnitX();
+  rail.lower = -1000.0;
+  rail.upper = 1000.0;
+  rail.redundant = true;
+  chain.joints.insert(chain.joints.begin(), rail);
+  REQUIRE(redundant_joint(chain) == 0);
+  const auto pair = RotaryPair::from(chain);
+  REQUIRE(pair);
+  int linear = -1;  // the machine's own axis along the rail
+  for (int j = 1; j < chain.size(); ++j)
+    if (chain.joints[std::size_t(j)].kind == JointKind::linear &&
+        std::abs(chain.joints[std::size_t(j)].direction.x()) > 0.99)
+      linear = j;
+  REQUIRE(linear > 0);
+  const auto along = [](double s) {
+    LocationJet at{constant_jet(Vec3(0.3 * s, 10, 5)), constant_jet(Vec3(0, 0.3, 1).normalized())};
+    at.tip.col(1) = Vec3(0.3, 0, 0);
+    return at;
+  };
+  const RedundantPath path = redundant_path(*pair, along, {0.0, 300.0});
+  MinimumNormSettings settings;
+  settings.weight = JointVector::Constant(6, 1.0);
+  settings.weight[0] = 3.0;
+  settings.near = JointVector::Zero(6);
+  const MinimumNorm found = minimum_norm(path, settings);
+  REQUIRE(found.ok);
+  // Both go along X and share the way as their weights have it.
+  const auto a = path.joints(0.0, found.free.free.front(), settings.near);
+  const auto b = path.joints(300.0, found.free.free.back(), settings.near);
+  REQUIRE(a);
+  REQUIRE(b);
+  const double moved = (*b - *a)[linear] * chain.joints[std::size_t(linear)].direction.x() *
+                       (chain.joints[std::size_t(linear)].side == ChainSide::tool ? 1.0 : -1.0);
+  CHECK((*b - *a).cwiseAbs().tail(5).sum() == Approx(std::abs((*b - *a)[linear])).margin(0.2));
+  CHECK(moved / (*b - *a)[0] == Approx(3.0).epsilon(1e-6));
+  // With an axis too short for the way the grid takes the rail.
+  GlobalSettings grid;
+  grid.weight = settings.weight;
+  grid.near = settings.near;
+  grid.lower = JointVector::Constant(6, -1e4);
+  grid.upper = JointVector::Constant(6, 1e4);
+  grid.lower[linear] = (*a)[linear] - 10.0;
+  grid.upper[linear] = (*a)[linear] + 10.0;
+  grid.free_lower = -200.0;
+  grid.free_upper = 200.0;
+  grid.grid = 2.0;
+  std::vector<double> stations;
+  for (int i = 0; i <= 60; ++i) stations.push_back(5.0 * i);
+  const GlobalResolution chosen = resolve_globally(path, stations, grid);
+  REQUIRE(chosen.status == GlobalResolution::Status::ok);
+  CHECK(std::abs(chosen.free.back() - chosen.free.front()) >= 70.0 - 1e-9);
+  for (std::size_t i = 0; i < stations.size(); ++i) {
+    const CutterLocation at = forward_location(chain, chosen.q[i]);
+    CHECK((at.tip - along(stations[i]).tip.col(0)).norm() < 1e-9);
+  }
+}
+
+TEST_CASE("smooth_free: a robot's turn about its tool", "[kernels][optimise]") {
+  const ScrewChain chain = test::kr60();
+  const auto arm = SixR::from(chain);
+  REQUIRE(arm);
+  const JointVector middle = joints({0.2, -0.4, 0.5, 0.3, 0.9, -0.2});
+  const Pose start = forward(chain, middle);
+  const Vec3 tool = start.linear() * chain.tool_axis;
+  const Vec3 away = tool.unitOrthogonal();
+  // A wave of the tip; the tool's rotation about its axis is σ.
+  const auto pose_at = [&](double s, const Jet& free) {
+    const Jet place{0.05 * s, 0.05, 0.0, 0.0};
+    const SineCosine wave = sine_cosine(place);
+    PoseJet at;
+    at.tip = constant_jet(start.translation());
+    at.tip.col(0) += s * away;
+    at.tip.col(1) += away;
+    for (int r = 0; r < 4; ++r)
+      at.tip.col(r) += 15.0 * wave.sine[std::size_t(r)] * tool.cross(away);
+    const SineCosine turn = sine_cosine(free);
+    for (int c = 0; c < 3; ++c) {
+      const VectorJet column = turned(tool, turn, constant_jet(start.linear().col(c)));
+      for (std::size_t r = 0; r < 4; ++r)
+        at.rotation[r].col(c) = column.col(static_cast<Eigen::Index>(r));
+    }
+    return at;
+  };
+  RedundantPath path;
+  path.first = 0.0;
+  path.last = 60.0;
+  path.breaks = {0.0, 60.0};
+  path.joints = [&](double s, double free, const JointVector& near) -> std::optional<JointVector> {
+    const PoseJet at = pose_at(s, {free, 0, 0, 0});
+    Pose pose = Pose::Identity();
+    pose.linear() = at.rotation[0];
+    pose.translation() = at.tip.col(0);
+    const SixRSolutions found = arm->solve(pose, near);
+    std::optional<JointVector> best;
+    for (std::size_t b = 0; b < 8; ++b) {
+      if (!found.valid[b]) continue;
+      JointVector q = found.q[b];
+      for (int j = 0; j < 6; ++j) q[j] += 2 * kPi * std::round((near[j] - q[j]) / (2 * kPi));
+      if (!best || (q - near).norm() < (*best - near).norm()) best = q;
+    }
+    return best;
+  };
+  FreeJoints all{};
+  for (int j = 0; j < 6; ++j) all[std::size_t(j)] = true;
+  path.jet = [&](double s, const Jet& free, const JointVector& near) -> std::optional<JointJet> {
+    const auto q = path.joints(s, free[0], near);
+    if (!q) return {};
+    JointJet jet = JointJet::Zero(6, 4);
+    jet.col(0) = *q;
+    return joint_jet(chain, jet, all, pose_at(s, free));
+  };
+  const JointVector weight = joints({1, 1, 1, 0.5, 0.5, 0.2});
+  MinimumNormSettings local;
+  local.weight = weight;
+  local.near = middle;
+  local.change = 0.0;
+  local.step = 2.0;
+  const MinimumNorm norm = minimum_norm(path, local);
+  REQUIRE(norm.ok);
+  CHECK(std::abs(norm.change) < 1e-12);
+  std::vector<double> places;
+  for (int i = 0; i <= 60; ++i) places.push_back(i);
+  const FreeCost still = free_cost(
+      path, [](double) { return Jet{}; }, places, weight, weight, middle);
+  REQUIRE(still.ok);
+  CHECK(norm.cost < 0.999 * still.velocity);
+  SmoothFreeSettings settings;
+  settings.velocity_weight = settings.jerk_weight = weight;
+  settings.lower = JointVector::Constant(6, -7);
+  settings.upper = JointVector::Constant(6, 7);
+  settings.free_lower = -4;
+  settings.free_upper = 4;
+  settings.spacing = 4.0;
+  settings.most_passes = 40;
+  const SmoothFree found = smooth_free(path, norm.free, middle, settings);
+  REQUIRE(found.ok);
+  CHECK(found.after.jerk < still.jerk);
+  CHECK(found.after.jerk <= found.before.jerk);
+  for (const double s : {7.0, 33.0, 51.0}) {
+    const auto q = path.joints(s, found.jet(s)[0], middle);
+    REQUIRE(q);
+    const Pose at = forward(chain, *q);
+    CHECK((at.translation() - pose_at(s, {}).tip.col(0)).norm() < 1e-9);
+    CHECK(angle_between(at.linear() * chain.tool_axis, tool) < 1e-12);
+  }
 }
 
 TEST_CASE("minimum_norm: golden bed angles of paper C", "[kernels][optimise][paper]") {

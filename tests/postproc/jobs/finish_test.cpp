@@ -99,9 +99,59 @@ TEST_CASE("finish: refusals and options", "[postproc][jobs][finish]") {
   o = box_options();
   o.input_data = "solid\n";
   CHECK(status(run_job(o, {})) == 4);
+  for (const auto& [option, value] :
+       std::vector<std::pair<std::string Options::*, std::string>>{{&Options::mill, "2"},
+                                                                   {&Options::mill, "2,1"},
+                                                                   {&Options::mill, "x,30"},
+                                                                   {&Options::steepest, "95"},
+                                                                   {&Options::contours, "inner"},
+                                                                   {&Options::unreachable, "skip"},
+                                                                   {&Options::scale, "0"}}) {
+    o = box_options();
+    o.*option = value;
+    done = run_job(o, {});
+    CAPTURE(value);
+    CHECK(status(done) == 2);
+    CHECK(says(done, "US166"));
+  }
+  o = box_options();
+  o.workpiece_unit = "foot";
+  CHECK(says(run_job(o, {}), "US145"));
   // An inch file is 25.4 times larger.
   o = box_options();
   o.input_data = stl_bytes(weld(test::box({-0.8, -0.6, 0}, {0.8, 0.6, 1.2})));
   o.workpiece_unit = "inch";
   CHECK(status(run_job(o, {})) == 0);
+}
+
+TEST_CASE("finish: a place is found, and what it leaves out is told", "[postproc][jobs][finish]") {
+  // In metres and ten times too large: 40 x 30 x 30 mm again.
+  Options o = box_options();
+  o.input_data = stl_bytes(weld(test::box({0.1, 0.3, 0.2}, {0.5, 0.6, 0.5})));
+  o.workpiece_unit = "m";
+  o.scale = "0.1";
+  o.from = o.to = "30";
+  o.work_offset = {"auto"};
+  JobResult done = run_job(o, {});
+  for (const auto& d : done.diagnostics) UNSCOPED_INFO(to_string(d));
+  CHECK(done.verdict == "certified");
+  CHECK(says(done, "RG144"));
+  CHECK(done.report.find("a place that smoothpost has found") != std::string::npos);
+  // On the bed itself the spindle has no room at the lowest layer.
+  o = box_options();
+  o.work_offset = {"G54=0,0,0"};
+  o.from = "8";
+  o.to = "28";
+  o.pitch = "20";
+  done = run_job(o, {});
+  CHECK(status(done) == 3);
+  CHECK(done.program.empty());
+  o.unreachable = "leave-out";
+  done = run_job(o, {});
+  for (const auto& d : done.diagnostics) UNSCOPED_INFO(to_string(d));
+  CHECK(done.verdict == "certified");
+  CHECK(says(done, "RG141"));
+  CHECK(done.report.find("left out on your word") != std::string::npos);
+  CHECK(done.program.find("CUT 4") != std::string::npos);
+  CHECK(done.program.find("CUT 5") == std::string::npos);
 }

@@ -7,6 +7,7 @@
 #include "postproc/pipeline/convert.h"
 #include "postproc/pipeline/finish_path.h"
 #include "postproc/pipeline/finish_plan.h"
+#include "postproc/pipeline/finish_reach.h"
 #include "tests/kernels/geometry/parts.h"
 #include "tests/support/machines.h"
 
@@ -108,14 +109,108 @@ TEST_CASE("make_finish_path: holes and edges and flat walls", "[postproc][pipeli
     const test::Soup ring =
         test::together({test::ellipse_body(30, 30, 20, 180, 12),
                         test::turned_over(test::ellipse_body(15, 15, 20, 120, 12))});
-    const FinishPath path = path_of(ring, layers(8, 8));
+    FinishSettings settings = layers(8, 8);
+    settings.mill = {1.5, 6.0};
+    const FinishPath path = path_of(ring, settings);
     REQUIRE(path.cuts.size() == 2);
+    for (const Check& c : path.checks) CHECK(c.ok);
     for (const FinishCut& cut : path.cuts) {
       const LocationJet at = cut.location(0.5 * cut.length());
       const double radius = at.tip.col(0).head<2>().norm();
       const double outwards = at.axis.col(0).dot(at.tip.col(0)) / radius;
       CHECK(outwards == Approx(radius > 20 ? 1.0 : -1.0).margin(1e-3));
     }
+  }
+  SECTION("a hole that the mill does not fit in; outer contours only") {
+    const test::Soup ring =
+        test::together({test::ellipse_body(30, 30, 20, 180, 12),
+                        test::turned_over(test::ellipse_body(12, 12, 20, 120, 12))});
+    const FinishPath path = path_of(ring, layers(8, 8));
+    REQUIRE(path.cuts.size() == 1);
+    CHECK(path.layers[0].left_out.mill == Approx(2 * 12 * kPi).epsilon(0.01));
+    FinishSettings settings = layers(8, 8);
+    settings.outer_only = true;
+    const auto made = make_finish_path(weld(ring), settings, "p", {});
+    REQUIRE(made.ok());
+    CHECK(made.value().cuts.size() == 1);
+    CHECK(made.value().layers[0].left_out.mill == 0.0);
+    CHECK(says(made.diagnostics(), "RG142"));
+  }
+  SECTION("the mill stays out of a hollow corner") {
+    // An L: the corner at (0, 0) is hollow.
+    const std::vector<Vec3> outline{{0, 0, 0},     {0, 20, 0},   {-20, 20, 0},
+                                    {-20, -20, 0}, {20, -20, 0}, {20, 0, 0}};
+    const FinishPath path = path_of(test::prism(outline, 20), layers(10, 10));
+    for (const Check& c : path.checks) CHECK(c.ok);
+    CHECK(path.layers[0].left_out.mill == Approx(2 * (1.5 + 0.75)).margin(0.6));
+    for (const FinishCut& cut : path.cuts)
+      for (double s = 0.0; s <= cut.length(); s += 0.2) {
+        const LocationJet at = cut.location(s);
+        const Vec3 ball = at.tip.col(0) + 1.5 * at.axis.col(0);
+        const Vec3 into(std::max(ball.x(), 0.0), std::max(ball.y(), 0.0), 0.0);
+        if (ball.x() > 0.0 && ball.y() > 0.0 && ball.x() < 20.0 && ball.y() < 20.0)
+          CHECK(into.head<2>().minCoeff() > 1.5 - 0.07);
+      }
+  }
+  SECTION("facets of 10 deg: the stock is that of the cylinder that they stand for") {
+    const FinishPath path = path_of(test::ellipse_body(35, 35, 40, 36, 8), layers(12, 12));
+    REQUIRE(path.cuts.size() == 1);
+    CHECK(check_of(path.checks, "depth_of_cut").ok);
+    for (double s = 6.0; s < path.cuts[0].length() - 6.0; s += 3.1)
+      CHECK(path.cuts[0].location(s).tip.col(0).head<2>().norm() == Approx(35.0).margin(0.03));
+  }
+  SECTION("walls inside of another body are not cut") {
+    const FinishPath path = path_of(test::together({test::box({-20, -15, 0}, {20, 15, 30}),
+                                                    test::box({10, -5, 0}, {40, 5, 30})}),
+                                    layers(10, 10));
+    for (const Check& c : path.checks) CHECK(c.ok);
+    // At least 10 mm of two sides and one end of the second box, and 10 mm of the first one's face.
+    const LeftOut& out = path.layers[0].left_out;
+    CHECK(out.buried + out.mill > 2 * 10 + 10 + 10 - 2.5);
+    for (const FinishCut& cut : path.cuts) {
+      const Vec3 middle = cut.location(0.5 * cut.length()).tip.col(0);
+      const bool in_first = std::abs(middle.x()) < 19.9 && std::abs(middle.y()) < 14.9;
+      const bool in_second = middle.x() > 10.1 && middle.x() < 39.9 && std::abs(middle.y()) < 4.9;
+      CHECK_FALSE(in_first);
+      CHECK_FALSE(in_second);
+    }
+  }
+  SECTION("inside out") {
+    const FinishPath path =
+        path_of(test::turned_over(test::box({-20, -15, 0}, {20, 15, 30})), layers(10, 10));
+    CHECK(path.cuts.size() == 4);
+    CHECK(check_of(path.checks, "depth_of_cut").ok);
+  }
+  SECTION("a contour that no smooth curve follows is parted") {
+    // Sides of 20 deg to each other, too long for a quadric: planes that are no edges.
+    std::vector<Vec3> outline;
+    for (int i = 0; i < 18; ++i) outline.push_back(test::on_ellipse(60, 60, 2 * kPi * i / 18));
+    FinishSettings settings = layers(10, 10);
+    settings.axis_tolerance = radians_from_degrees(0.05);
+    settings.tip_tolerance = 2e-4;
+    const auto made = make_finish_path(weld(test::prism(outline, 20)), settings, "p", {});
+    REQUIRE(made.ok());
+    for (const Check& c : made.value().checks)
+      if (c.name != "depth_of_cut") CHECK(c.ok);
+    double cut = 0.0;
+    for (const FinishCut& c : made.value().cuts) cut += c.length() - 2 * 0.5 * kPi * 3.0;
+    const FinishLayer& layer = made.value().layers[0];
+    CHECK(cut + layer.left_out.rough + layer.left_out.too_short ==
+          Approx(layer.length).epsilon(0.05));
+  }
+  SECTION("places that a test refuses") {
+    FinishSettings settings = layers(10, 10);
+    settings.reach_with = [](const TriangleMesh&) {
+      return [](const CutterLocation& at) { return at.tip.x() < 10.0; };
+    };
+    const auto made =
+        make_finish_path(weld(test::box({-20, -15, 0}, {20, 15, 30})), settings, "p", {});
+    REQUIRE(made.ok());
+    CHECK(made.value().cuts.size() == 3);
+    CHECK(made.value().layers[0].left_out.reach == Approx(30 + 2 * 10).margin(2.5));
+    CHECK(says(made.diagnostics(), "RG141"));
+    for (const FinishCut& c : made.value().cuts)
+      CHECK(c.location(0.5 * c.length()).tip(0, 0) < 10.0);
   }
   SECTION("a box is cut face by face up to its edges") {
     const FinishPath path = path_of(test::box({-20, -15, 0}, {20, 15, 30}), layers(10, 10));
@@ -140,6 +235,7 @@ TEST_CASE("make_finish_path: holes and edges and flat walls", "[postproc][pipeli
   SECTION("a hollow too narrow for the depth is said") {
     FinishSettings settings = layers(5, 5);
     settings.depth = 6.0;
+    settings.mill = {0.5, 2.0};
     const test::Soup tube =
         test::together({test::ellipse_body(30, 30, 20, 180, 12),
                         test::turned_over(test::ellipse_body(4, 4, 20, 60, 12))});
@@ -268,6 +364,62 @@ TEST_CASE("plan_finish: refusals name place and axis", "[postproc][pipeline][fin
     REQUIRE_FALSE(planned.ok());
     CHECK(says(planned.diagnostics(), "KN172"));
   }
+}
+
+TEST_CASE("find_finish_place: over the middle and as low as the machine reaches",
+          "[postproc][pipeline][finish]") {
+  test::Soup part = test::ellipse_body(25, 20, 20, 90, 20);
+  for (Vec3& v : part) v += Vec3(300, -40, 7);
+  const FinishPath path = path_of(part, layers(12, 20));
+  const MachineDefinition machine = test::shipped_machine("finish_2p2r_1p1r");
+  const auto found = find_finish_place(path, machine, true);
+  REQUIRE(found);
+  CHECK(found->reached == found->points);
+  CHECK(found->position.x() == Approx(-300).margin(0.5));
+  CHECK(found->position.y() == Approx(40).margin(0.5));
+  // At that height every point has joints inside their ranges; 5 mm lower some have not.
+  const auto reached = [&](double lower) {
+    Pose at = Pose::Identity();
+    at.translation() = found->position - Vec3(0, 0, lower);
+    const auto reach = FinishReach::make({machine, at, &path.stock, nullptr, true});
+    REQUIRE(reach);
+    ScrewChain chain = chain_of(machine);
+    chain.workpiece_home = chain.workpiece_home * at;
+    const JointLimits limits = limits_of(machine);
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < path.path.points.size(); i += 20) {
+      const CutterLocation& want = path.path.points[i].location;
+      const auto q = reach->joints(want, 0.0);
+      if (!q) continue;
+      ++count;
+      CHECK((forward_location(chain, *q).tip - want.tip).norm() < 1e-9);
+      CHECK((*q - limits.lower).minCoeff() >= 0.0);
+      CHECK((limits.upper - *q).minCoeff() >= 0.0);
+    }
+    return count;
+  };
+  const std::size_t all = (path.path.points.size() + 19) / 20;
+  CHECK(reached(0.0) == all);
+  CHECK(reached(5.0) < all);
+}
+
+TEST_CASE("without_cuts: the rest is a path of its own", "[postproc][pipeline][finish]") {
+  const FinishPath whole = path_of(test::box({-20, -15, 0}, {20, 15, 30}), layers(10, 11));
+  REQUIRE(whole.cuts.size() == 8);
+  const FinishPath rest = without_cuts(whole, {0, 5});
+  REQUIRE(rest.cuts.size() == 6);
+  CHECK(rest.layers[0].cuts == 3);
+  CHECK(rest.layers[0].left_out.reach == Approx(whole.cuts[0].length()));
+  CHECK(rest.path.points.size() ==
+        whole.path.points.size() - whole.cuts[0].s.size() - whole.cuts[5].s.size());
+  CHECK(rest.path.events.back().point + 1 == rest.path.points.size());
+  for (const FinishCut& cut : rest.cuts)
+    for (std::size_t i = 0; i < cut.s.size(); ++i) {
+      const PathPoint& p = rest.path.points[cut.first_point + i];
+      CHECK((p.location.tip - cut.location(cut.s[i]).tip.col(0)).norm() < 1e-12);
+      CHECK(p.line == cut.first_point + i + 1);
+      CHECK((p.kind == MotionKind::rapid) == (i == 0));
+    }
 }
 
 TEST_CASE("convert: a finishing path is certified", "[postproc][pipeline][finish]") {

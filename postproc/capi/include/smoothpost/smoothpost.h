@@ -130,12 +130,17 @@ typedef struct smoothpost_options {
   const char* stock_out;        /* finish: a path for the STL of the body to be printed */
   const char* run_budget; /* nc: blocks that loops, calls and cycles may run beyond the text */
   const char* call_depth; /* nc: calls within each other */
-  const char* jobs;             /* batch: how many run at a time; default one a processor */
-  const char* only;             /* batch: the one job to run, in this process */
-  const char* worker; /* batch: the program that runs a job; default the smoothpost beside the
-                         library */
-  int list;           /* batch: names the jobs in the result's text, runs none */
-  int in_place; /* convert: the program replaces the file `input`, only if it is certified */
+  const char* jobs;       /* batch: how many run at a time; default one a processor */
+  const char* only;       /* batch: the one job to run, in this process */
+  const char* worker;     /* batch: the program that runs a job; default the smoothpost beside the
+                             library */
+  int list;               /* batch: names the jobs in the result's text, runs none */
+  int in_place;     /* convert: the program replaces the file `input`, only if it is certified */
+  const char* mill; /* finish: R,L: radius and free length of the end mill, mm */
+  const char* steepest;    /* finish: deg, walls farther from upright are left out */
+  const char* contours;    /* finish: all | outer */
+  const char* unreachable; /* finish: refuse | leave-out */
+  const char* scale;       /* finish: a factor of the part's size */
 } smoothpost_options;
 
 /* All members to "not given". `size` is sizeof(smoothpost_options) as the caller knows it. */
