@@ -104,9 +104,9 @@ void add_part_options(CLI::App* app, CommandLine& l) {
 
 // How a CAM program is to be read, and how closely it is to be followed.
 void add_input_options(CLI::App* app, CommandLine& l) {
-  app->add_option("--input-format", l.input_format, "nc | cl | csv");
+  app->add_option("--input-format", l.input_format, "nc | heidenhain | cl | csv");
   app->add_option("--input-dialect", l.input_dialect,
-                  "linuxcnc | fanuc | haas | siemens; found out when only one fits");
+                  "linuxcnc | fanuc | haas | siemens | heidenhain; found out when only one fits");
   app->add_option("--integer-unit", l.integer_unit,
                   "fanuc, haas: what one unit of a number without point is, 1 or 0.001 (mm, deg)");
   app->add_option("--input-unit", l.input_unit,

@@ -32,6 +32,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
+constexpr const char* kConversational = "heidenhain";  // a dialect that is a format of its own
+
 std::string base_name(const std::string& path) { return fs::path(path).filename().string(); }
 
 std::string decimal(double value, int digits) {
@@ -345,18 +347,26 @@ class Run {
     return in.against.has_value();
   }
 
-  std::optional<InterpretedInput> read_cam_program(const std::string& name, std::string bytes) {
-    if (wants_page()) page_text_ = bytes;
+  /// --input-dialect heidenhain is the format of that name for every name of a file but CL and CSV.
+  const InputFormat* format_of(const std::string& name) const {
     const InputFormat* format = options_.input_format.empty()
                                     ? format_by_extension(name)
                                     : find_input_format(options_.input_format);
+    const bool words = format == nullptr ? options_.input_format.empty() : format->has_words;
+    return words && options_.input_dialect == kConversational ? find_input_format(kConversational)
+                                                              : format;
+  }
+
+  std::optional<InterpretedInput> read_cam_program(const std::string& name, std::string bytes) {
+    if (wants_page()) page_text_ = bytes;
+    const InputFormat* format = format_of(name);
     if (!format) {
       add(usage_error("US103",
                       options_.input_format.empty()
                           ? "the format of " + name +
                                 " cannot be told from its name: say --input-format nc|cl|csv"
                           : "--input-format " + options_.input_format +
-                                " is not read in this version; possible: cl, csv, nc"));
+                                " is not read in this version; possible: cl, csv, heidenhain, nc"));
       return {};
     }
     context_.input_format = format->name;
@@ -373,12 +383,12 @@ class Run {
   }
 
   bool read_dialect(InputSettings& settings) {
-    if (!options_.input_dialect.empty()) {
+    if (!options_.input_dialect.empty() && options_.input_dialect != kConversational) {
       settings.dialect = input_dialect(options_.input_dialect);
       if (!settings.dialect) {
         add(usage_error("US122", "--input-dialect " + options_.input_dialect +
                                      " is not read in this version; possible: linuxcnc, fanuc, "
-                                     "haas, siemens"));
+                                     "haas, siemens, heidenhain"));
         return false;
       }
     }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "formats/csv/cutter_locations.h"
+#include "formats/heidenhain/reader.h"
 #include "formats/nc/dialect_detection.h"
 #include "formats/nc/parser.h"
 #include "kernels/core/units.h"
@@ -255,13 +256,26 @@ class PathBuilder {
     // A program that never compensates describes the tip itself; one that does is at the holder's
     // reference until it compensates.
     point.tip_offset = compensates_ ? tool_length_ - compensation_ : 0.0;
-    if (motion.axis_vector) set_location(point, motion.end, motion.end_axis);
+    if (motion.axis_vector)
+      set_location(point, motion.end, axis_of(motion.end_axis, motion.end, point));
     if (motion.is_arc) {
       point.is_arc = true;
       point.arc = static_cast<std::int32_t>(out_.path.arcs.size());
       out_.path.arcs.push_back(motion.arc);
     }
     return point;
+  }
+
+  /// The frames are settled once the first motion is there.
+  const ReferencePath& reference() {
+    if (!reference_) reference_.emplace(out_.path, out_.frames);
+    return *reference_;
+  }
+
+  /// The tool axis in world coordinates: as given, else the input machine's at the rotary words.
+  Vec3 axis_of(const Vec3& given, const AxisWords& words, const PathPoint& like) {
+    if (!given.isZero(0.0)) return given;
+    return out_.frames.world_from_part.linear() * reference().location_of_words(words, like).axis;
   }
 
   void set_location(PathPoint& point, const AxisWords& words, const Vec3& axis) const {
@@ -276,7 +290,10 @@ class PathBuilder {
   void add_start_point(const CanonicalMotion& motion, const PathPoint& like) {
     PathPoint start = like;
     start.words = motion.start;
-    if (motion.axis_vector) set_location(start, motion.start, motion.start_axis);
+    if (motion.axis_vector) {
+      start.interpolation = PathInterpolation::rotary_linear;
+      set_location(start, motion.start, axis_of(motion.start_axis, motion.start, start));
+    }
     start.is_arc = false;
     start.arc = -1;
     start.duration = 0.0;
@@ -284,11 +301,11 @@ class PathBuilder {
   }
 
   // The tip at `words` as the controller reads them for `like`.
-  Vec3 tip_of(const AxisWords& words, const PathPoint& like) const {
+  Vec3 tip_of(const AxisWords& words, const PathPoint& like) {
     if (like.interpolation == PathInterpolation::great_circle)
       return out_.frames.world_from_part.inverse() * Vec3(words[0], words[1], words[2]) -
              like.tip_offset * like.location.axis;
-    return ReferencePath(out_.path, out_.frames).location_of_words(words, like).tip;
+    return reference().location_of_words(words, like).tip;
   }
 
   void push(PathPoint point) {
@@ -398,6 +415,7 @@ class PathBuilder {
   Recorder& recorder_;
   const InputSettings& settings_;
   InterpretedInput out_;
+  std::optional<ReferencePath> reference_;
   Diagnostics diagnostics_;
   AxisMask programmed_ = 0;
   std::size_t last_feed_ = 0;
@@ -481,13 +499,6 @@ Result<nc::InputDialect> dialect_of(const std::string& text, const InputSettings
   if (settings.dialect) return Result<nc::InputDialect>(*settings.dialect);
   Diagnostic d;
   d.where.file = settings.file_name;
-  if (nc::is_heidenhain(text)) {
-    d.code = "US149";
-    d.text =
-        "this is a Heidenhain conversational program (BEGIN PGM), which this version does not "
-        "read";
-    return Result<nc::InputDialect>::failure(d);
-  }
   const auto fitting = nc::fitting_dialects(text);
   if (fitting.size() > 1) {
     d.code = "US149";
@@ -508,6 +519,19 @@ Result<nc::InputDialect> dialect_of(const std::string& text, const InputSettings
 }  // namespace
 
 Result<InterpretedInput> interpret_nc(std::string text, const InputSettings& settings) {
+  if (!settings.dialect && nc::is_heidenhain(text)) {
+    auto read = interpret_heidenhain(std::move(text), settings);
+    if (!read.ok()) return read;
+    Diagnostic d;
+    d.severity = Severity::note;
+    d.code = "NC315";
+    d.text =
+        "read as dialect heidenhain: BEGIN PGM stands at its head (--input-dialect says another)";
+    d.where.file = settings.file_name;
+    Diagnostics diagnostics = {d};
+    diagnostics.insert(diagnostics.end(), read.diagnostics().begin(), read.diagnostics().end());
+    return Result<InterpretedInput>(std::move(read.value()), std::move(diagnostics));
+  }
   const auto dialect = dialect_of(text, settings);
   if (!dialect.ok()) return Result<InterpretedInput>::failure(dialect.diagnostics());
   auto parsed = nc::parse(std::move(text), settings.file_name, dialect.value());
@@ -529,6 +553,33 @@ Result<InterpretedInput> interpret_nc(std::string text, const InputSettings& set
   return Result<InterpretedInput>(std::move(built.value()), std::move(diagnostics));
 }
 
+namespace {
+
+/// The path of what a reader with a summary of its own called.
+template <typename Summary>
+Result<InterpretedInput> built_path(Recorder& recorder, const InputSettings& settings,
+                                    const Summary& summary, Diagnostics diagnostics,
+                                    const char* dialect) {
+  auto built = PathBuilder(recorder, settings).run();
+  diagnostics.insert(diagnostics.end(), built.diagnostics().begin(), built.diagnostics().end());
+  if (!built.ok()) return Result<InterpretedInput>::failure(std::move(diagnostics));
+  built.value().lines = summary.lines;
+  built.value().dialect = dialect;
+  for (const auto& assumed : summary.assumes) built.value().assumes.push_back(assumed);
+  return Result<InterpretedInput>(std::move(built.value()), std::move(diagnostics));
+}
+
+}  // namespace
+
+Result<InterpretedInput> interpret_heidenhain(std::string text, const InputSettings& settings) {
+  nc::InterpreterSettings reader = interpreter_settings(settings);
+  reader.inch_default = false;  // the text says its unit
+  Recorder recorder;
+  const auto summary = conversational::read(text, settings.file_name, reader, recorder);
+  if (!summary.ok()) return Result<InterpretedInput>::failure(summary.diagnostics());
+  return built_path(recorder, settings, summary.value(), summary.diagnostics(), "heidenhain");
+}
+
 Result<InterpretedInput> interpret_cl(std::string text, const InputSettings& settings) {
   cl::ReaderSettings reader = settings.cl;
   if (settings.machine) reader.process = settings.machine->process;
@@ -536,13 +587,7 @@ Result<InterpretedInput> interpret_cl(std::string text, const InputSettings& set
   Recorder recorder;
   const auto summary = cl::read(text, settings.file_name, reader, recorder);
   if (!summary.ok()) return Result<InterpretedInput>::failure(summary.diagnostics());
-  Diagnostics diagnostics = summary.diagnostics();
-  auto built = PathBuilder(recorder, settings).run();
-  diagnostics.insert(diagnostics.end(), built.diagnostics().begin(), built.diagnostics().end());
-  if (!built.ok()) return Result<InterpretedInput>::failure(std::move(diagnostics));
-  built.value().lines = summary.value().lines;
-  for (const auto& assumed : summary.value().assumes) built.value().assumes.push_back(assumed);
-  return Result<InterpretedInput>(std::move(built.value()), std::move(diagnostics));
+  return built_path(recorder, settings, summary.value(), summary.diagnostics(), "");
 }
 
 Result<InterpretedInput> interpret_csv(std::string text, const InputSettings& settings) {

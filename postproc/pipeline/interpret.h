@@ -55,7 +55,9 @@ struct InterpretedInput {
   int system = 1;                ///< work system of the first motion, 1..9 for G54..G59.3
 };
 
-/// Reads NC text: parse, modal interpretation, then the input machine's kinematics.
+/// Reads NC text (a text with BEGIN PGM at its head by interpret_heidenhain, unless
+/// settings.dialect says a dialect): parse, modal interpretation, then the input machine's
+/// kinematics.
 ///  - The way from the unknown position before the program to the first known position, and the way
 ///  over
 ///    positions of the input machine (G53, G28, G30), have no meaning on another machine: such
@@ -63,6 +65,9 @@ struct InterpretedInput {
 ///    takes over).
 ///  - W is the program's coordinate system at its first motion.
 Result<InterpretedInput> interpret_nc(std::string text, const InputSettings& settings);
+
+/// Reads a conversational program of Heidenhain controls; points and events as for NC text.
+Result<InterpretedInput> interpret_heidenhain(std::string text, const InputSettings& settings);
 
 /// Reads CL data (APT, NX CLSF): tip and tool axis in the part, the way to the first position and
 /// events as for NC text. W is the frame of the coordinates.

@@ -22,10 +22,12 @@ namespace smoothpost {
 
 namespace {
 
-constexpr std::array<InputFormat, 3> kFormats = {{
+constexpr std::array<InputFormat, 4> kFormats = {{
     {"cl", "CL data: APT, NX CLSF (docs/formats_cl.md)", "apt aptsource as cl cld clf cls clsf ncl",
      false, &interpret_cl},
     {"csv", "cutter locations, one a line (docs/formats_csv.md)", "csv", false, &interpret_csv},
+    {"heidenhain", "conversational program of Heidenhain controls (docs/formats_heidenhain.md)",
+     "h", true, &interpret_heidenhain},
     {"nc", "NC program, RS274NGC as LinuxCNC reads it (docs/formats_nc.md)",
      "ngc nc tap cnc gcode eia mpf spf txt", true, &interpret_nc},
 }};
