@@ -1,6 +1,5 @@
 #include "kernels/spline/chebyshev_path.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -11,7 +10,6 @@ namespace smoothpost {
 namespace {
 
 constexpr int kPoints = 10;
-constexpr int kEnds = 6;  // value and two derivatives at both ends of a piece
 constexpr double kPi = 3.14159265358979323846;
 
 using Basis = Eigen::Matrix<double, kPoints, 1>;
@@ -64,26 +62,6 @@ Values integral(const Values& c, const PathValue& at_middle) {
   for (int k = 2; k < kPoints; k += 2) out.col(0) += (k % 4 == 0 ? -1.0 : 1.0) * out.col(k);
   out.col(0) += at_middle;
   return out;
-}
-
-/// Coefficients of T_0 … T_5, in columns: the polynomial whose first or second derivative by t is 1
-/// at one end of [−1, 1] and whose other values and derivatives at both ends are 0. Columns: first
-/// and second at −1, first and second at 1.
-const Eigen::Matrix<double, kEnds, 4>& end_polynomials() {
-  static const Eigen::Matrix<double, kEnds, 4> matrix = [] {
-    Eigen::Matrix<double, kEnds, kEnds> conditions;
-    for (int end = 0; end < 2; ++end) {
-      const std::array<Basis, 4> t = basis(end == 0 ? -1.0 : 1.0);
-      for (int order = 0; order < 3; ++order)
-        conditions.row(3 * end + order) =
-            t[static_cast<std::size_t>(order)].head<kEnds>().transpose();
-    }
-    const Eigen::Matrix<double, kEnds, kEnds> all = conditions.inverse();
-    Eigen::Matrix<double, kEnds, 4> m;
-    m << all.col(1), all.col(2), all.col(4), all.col(5);
-    return m;
-  }();
-  return matrix;
 }
 
 }  // namespace
@@ -179,21 +157,6 @@ bool ChebyshevPath::append_jets(const JetFunction& f, double from, double to,
     }
   }
   return true;
-}
-
-void ChebyshevPath::join_pieces() {
-  for (std::size_t i = 1; i < pieces(); ++i) {
-    const double x = from(i);
-    const ChebyshevJet left = jet(i - 1, x), right = jet(i, x);
-    for (const std::size_t piece : {i - 1, i}) {
-      const double half = 0.5 * (to(piece) - from(piece)), sign = piece == i ? -0.5 : 0.5;
-      const PathValue first = sign * half * (right[1] - left[1]);
-      const PathValue second = sign * half * half * (right[2] - left[2]);
-      const Eigen::Index at = piece == i ? 0 : 2;
-      coefficients_[piece].leftCols<kEnds>() += first * end_polynomials().col(at).transpose() +
-                                                second * end_polynomials().col(at + 1).transpose();
-    }
-  }
 }
 
 void ChebyshevPath::shorten(std::size_t pieces) {

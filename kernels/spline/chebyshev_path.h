@@ -64,13 +64,6 @@ class ChebyshevPath {
   bool append_jets(const JetFunction& f, double from, double to, const PathValue& third,
                    const ChebyshevJetSettings& settings);
 
-  /// Makes first and second derivative continuous at every break between two pieces: both sides
-  /// take the mean of the two, by a polynomial of degree 5 on each piece that leaves the values at
-  /// its ends as they are. For paths that are C² but for how well their pieces are resolved: a jump
-  /// δ of the second derivative adds at most 4.5·δ/length to the third on a piece. Guarantee
-  /// (test): jumps of rounding alone are left.   Cost: two jets a break.
-  void join_pieces();
-
   /// Drops everything behind the first `pieces` pieces.
   void shorten(std::size_t pieces);
 

@@ -19,6 +19,7 @@ namespace {
 constexpr double kSameTime = 1e-9;       // s
 constexpr double kTimeDigit = 0.5e-6;    // s, half of the last one printed
 constexpr double kSlack = 1e-6;          // relative, of the comparison in doubles
+constexpr const char* kWait = "dwell";   // as the readers of dialects name it (ReadBackEvent)
 constexpr std::size_t kMoreColumns = 7;  // tip, axis, beam
 
 double display_scale(const AxisDefinition& axis) {
@@ -66,7 +67,11 @@ struct StreamMotion {
 class StreamMotionBuilder {
  public:
   StreamMotionBuilder(const StreamInput& input, const std::vector<StreamRow>& rows)
-      : in_(input), rows_(rows), cycle_(input.timeline.cycle) {}
+      : in_(input), rows_(rows), cycle_(input.timeline.cycle) {
+    moves_.assign(input.deviation.map.size(), false);
+    for (const TimelineItem& item : input.timeline.items)
+      if (item.move >= 0) moves_[static_cast<std::size_t>(item.move)] = true;
+  }
 
   StreamMotion run() {
     out_.read.exact_path = true;
@@ -77,6 +82,7 @@ class StreamMotionBuilder {
       step_to(k);
     }
     set_beam(rows_.size());
+    pass_to(in_.deviation.map.size());
     return std::move(out_);
   }
 
@@ -103,6 +109,7 @@ class StreamMotionBuilder {
     at_ = in_.timeline.item_at(time - 2.0 * kSameTime, at_);
     const TimelineItem& item = in_.timeline.items[at_];
     if (item.move < 0) return wait(k);
+    pass_to(static_cast<std::size_t>(item.move));
     const LineMapEntry& move = in_.deviation.map[static_cast<std::size_t>(item.move)];
     if (move.role != MoveRole::path) return push(k, {});
     const PathPlace to = place_on(item, move, time);
@@ -119,6 +126,21 @@ class StreamMotionBuilder {
     last_ = to;
     in_run_ = true;
     push(k, entry);
+  }
+
+  // Moves of the program without motion take no cycle: the row where they stand is where they end.
+  void pass_to(std::size_t move) {
+    for (; passed_ < move; ++passed_) {
+      const LineMapEntry& e = in_.deviation.map[passed_];
+      if (e.role != MoveRole::path || moves_[passed_]) continue;
+      if (!in_run_) continue;
+      const bool behind =
+          e.segment > last_.segment || (e.segment == last_.segment && e.to_share > last_.s);
+      if (!behind) continue;
+      last_ = {e.segment, e.to_share};
+      out_.map.back().segment = last_.segment;
+      out_.map.back().to_share = last_.s;
+    }
   }
 
   // Where the cycle starts on the input: where the last one has ended.
@@ -184,6 +206,8 @@ class StreamMotionBuilder {
   const StreamInput& in_;
   const std::vector<StreamRow>& rows_;
   double cycle_;
+  std::vector<bool> moves_;  ///< of the program that take time
+  std::size_t passed_ = 0;   ///< moves of the program looked at by pass_to()
   std::size_t at_ = 0;
   std::size_t ends_of_ = static_cast<std::size_t>(-1);
   std::array<double, 2> ends_{};  ///< s of the law at both ends of that item

@@ -137,7 +137,6 @@ class StretchBuilder {
 
   void finish(std::size_t last, StopCause cause) {
     if (last == now_.first_sample) return;
-    now_.path.join_pieces();
     now_.last_sample = last;
     now_.end = cause;
     out_.push_back(std::move(now_));
@@ -161,15 +160,14 @@ class StretchBuilder {
       now_.breaks.push_back(breaks[b]);
       while (sample < from.last_sample() && from.s[sample - from.first_sample] < breaks[b])
         ++sample;
-      add_piece_data(sample, 0.0);
+      add_piece_data(sample, in_.path.reference().feed(samples_[sample].segment), 0.0);
     }
     finish(from.last_sample(), StopCause::corner);
   }
 
-  // What holds on a piece that lies on the way to `sample`; of = s per second of the whole leg.
-  void add_piece_data(std::size_t sample, double rate) {
+  // What holds on a piece that lies on the way to `sample`; rate: s per second of the whole leg.
+  void add_piece_data(std::size_t sample, double feed, double rate) {
     const PathPoint& point = path_.points[samples_[sample].segment];
-    const double feed = in_.path.feed(samples_[sample].leg);
     now_.feed.push_back(feed > 0.0 ? feed : kInfinity);
     now_.rate.push_back(rate > 0.0 ? rate : kInfinity);
     now_.line.push_back(point.line);
@@ -367,7 +365,7 @@ class StretchBuilder {
       if (!last && std::min(size(sub), size(sub + 1)) >= fine) continue;
       now_.sub_end.push_back(static_cast<std::uint32_t>(sub + 1));
       now_.breaks.push_back(last ? at : path.to(sub));
-      add_piece_data(leg_last_, rate);
+      add_piece_data(leg_last_, in_.path.feed(samples_[leg_last_].leg), rate);
     }
   }
 
@@ -407,7 +405,7 @@ class StretchBuilder {
           },
           0.0, way, {});
       end_piece(way);
-      add_piece_data(i, rate_of(leg, extent));
+      add_piece_data(i, in_.path.feed(leg), rate_of(leg, extent));
     }
     now_.sample_s.push_back(way > 0.0 ? way : 0.0);
     finish(i, StopCause::no_formula);

@@ -115,7 +115,7 @@ std::optional<StretchPlanner::Shape> StretchPlanner::reshaped() const {
   if (settings_.hybrid) settings.solver.solver = QpSolver::banded;
   settings.hybrid = false;
   Shape shape;
-  shape.law = law_;
+  if (law_) shape.law.emplace(*law_);
   shape.rotaries = optimise_rotaries(rotary_problem(), settings);
   if (shape.rotaries.status != RotaryStatus::optimal) return {};
   StandoffOptions options = standoff_options(1.0);

@@ -12,6 +12,8 @@ namespace smoothpost {
 
 namespace {
 
+constexpr double kNearEnd = 0.1;  // of a cycle
+
 constexpr int kMillimetreDecimals = 7, kDegreeDecimals = 8, kMostDecimals = 9;
 constexpr double kRoundingShare = 0.05;  // of the jerk limit
 constexpr double kSameTime = 1e-9;       // s
@@ -94,9 +96,12 @@ class TimelineBuilder {
       const double slower = out_.laws[k].slowing / in_.schedule.stretches[k].slowing;
       item.law = move.stretch;
       item.from = move.stretch == stretch_ ? reached_ : 0.0;
-      item.duration = slower * move.stretch_time - item.from;
+      // What the last move's time misses the law's end by would shift everything behind it.
+      const double end = out_.laws[k].duration();
+      const double reached = slower * move.stretch_time;
+      reached_ = reached > end - kNearEnd * out_.cycle ? end : reached;
+      item.duration = std::max(0.0, reached_ - item.from);
       stretch_ = move.stretch;
-      reached_ = slower * move.stretch_time;
       return push(std::move(item));
     }
     ScheduledStretch law = straight(move, from);

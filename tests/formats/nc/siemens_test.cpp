@@ -336,7 +336,10 @@ TEST_CASE("siemens: drilling by CYCLE81 and CYCLE82", "[formats][nc][siemens]") 
         Heights{"r0 50", "r10 50", "r10 3", "f10 -5", "r10 20", "r30 20", "r30 3", "f30 -5",
                 "r30 20", "r40 20"});
   CHECK(heights("R1=4\nCYCLE82(20,1,2,,R1+2,0.5)") == Heights{"r0 50", "r0 3", "f0 -5", "r0 20"});
-  CHECK(siemens("G0 X0 Y0 Z50 F600\nCYCLE82(20,1,2,,6,0.5)").sink.dwells.size() == 1);
+  const Run waits = siemens("G0 X0 Y0 Z50 F600\nCYCLE82(20,1,2,,6,0.5)");
+  const auto& calls = waits.sink.calls;
+  CHECK(std::count_if(calls.begin(), calls.end(),
+                      [](const auto& e) { return e.kind == "dwell"; }) == 1);
   const auto errors = [](const std::string& lines) { return siemens(lines).errors(); };
   using Codes = std::vector<std::string>;
   CHECK(errors("G0 X0 Y0 Z50\nCYCLE81(20,1,2,-5)") == Codes{"NC261"});        // no feed
