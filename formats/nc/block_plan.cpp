@@ -182,14 +182,12 @@ LetterMask BlockPlanner::letters_of_g_codes(const BlockWords& block) const {
   LetterMask used = 0;
   const GCode mode0 = block.code(GGroup::non_modal);
   if (is_arc(plan_.motion)) used |= letter_bit('P') | letter_bit('R');
-  if (plan_.motion > 30 && plan_.motion != kPointArc) used |= letters_of_motion(block);
+  if (plan_.motion > 30) used |= letters_of_motion(block);
   if (mode0 == 40) used |= letter_bit('P');
   if (mode0 == 100) used |= letter_bit('L') | letter_bit('P') | letter_bit('R');
   if (sets_tool_data(block)) used |= letter_bit('Q');
   if (block.code(GGroup::path_control) == 640) used |= letter_bit('P') | letter_bit('Q');
   if (block.code(GGroup::length_offset) == 430) used |= letter_bit('H');
-  const GCode radius = block.code(GGroup::radius_compensation);
-  if (radius != kNoCode && radius != 400) used |= letter_bit('D');
   return used & block.letters;
 }
 

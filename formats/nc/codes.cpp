@@ -51,10 +51,10 @@ constexpr Row kRows[] = {
     {384, GGroup::motion, kLater, "probing"},
     {385, GGroup::motion, kLater, "probing"},
     {400, GGroup::radius_compensation, kRead, "end of cutter radius compensation"},
-    {410, GGroup::radius_compensation, kRead, "cutter radius compensation"},
-    {411, GGroup::radius_compensation, kRead, "cutter radius compensation"},
-    {420, GGroup::radius_compensation, kRead, "cutter radius compensation"},
-    {421, GGroup::radius_compensation, kRead, "cutter radius compensation"},
+    {410, GGroup::radius_compensation, kLater, "cutter radius compensation"},
+    {411, GGroup::radius_compensation, kLater, "cutter radius compensation"},
+    {420, GGroup::radius_compensation, kLater, "cutter radius compensation"},
+    {421, GGroup::radius_compensation, kLater, "cutter radius compensation"},
     {430, GGroup::length_offset, kRead, "tool length offset"},
     {431, GGroup::length_offset, kRead, "tool length offset by value"},
     {432, GGroup::length_offset, kLater, "added tool length offset"},
@@ -130,10 +130,6 @@ constexpr Row kFanucRows[] = {
     {150, GGroup::no_effect, kRead, "end of polar coordinates"},
     {160, GGroup::non_modal, kLater, "polar coordinates"},
     {310, GGroup::motion, kLater, "skip function"},
-    {410, GGroup::radius_compensation, kLater, "cutter radius compensation"},
-    {411, GGroup::radius_compensation, kLater, "cutter radius compensation"},
-    {420, GGroup::radius_compensation, kLater, "cutter radius compensation"},
-    {421, GGroup::radius_compensation, kLater, "cutter radius compensation"},
     {434, GGroup::length_offset, kRead, "tool-centre-point control with rotary positions"},
     {435, GGroup::length_offset, kRead, "tool-centre-point control with tool vectors"},
     {500, GGroup::no_effect, kRead, "end of scaling"},
@@ -216,7 +212,6 @@ constexpr Row kSiemensRows[] = {
     {6450, GGroup::path_control, kRead, "path blending"},
     {7000, GGroup::units, kRead, "inch, feed too"},
     {7100, GGroup::units, kRead, "millimetre, feed too"},
-    {kPointArc, GGroup::motion, kRead, "arc through a point"},
 };
 
 constexpr std::size_t kTableSize = 10000;
@@ -255,7 +250,6 @@ const GCodeInfo& g_code_info(GCode code, InputDialect dialect) {
 }
 
 std::string g_code_text(GCode code) {
-  if (code == kPointArc) return "CIP";
   std::string text = "G" + std::to_string(code / 10);
   if (code % 10 != 0) text += "." + std::to_string(code % 10);
   return text;

@@ -35,12 +35,7 @@ Executor::Executor(const Program& program, const InterpreterSettings& settings,
     : dialect_(program.dialect),
       settings_(settings),
       matcher_(matcher),
-      radius_(sink,
-              [this](const std::string& text, const CanonicalMotion& motion) {
-                log_.error("NC264", "cutter radius compensation: " + text,
-                           {motion.line, motion.column});
-              }),
-      sink_(radius_),
+      sink_(sink),
       log_(program.file_name),
       coordinates_(settings),
       tools_(tool_table(settings)),
@@ -69,7 +64,6 @@ Result<InterpretationSummary> Executor::run() {
   if (program.has_flow) tell_flow_faults(*unit_);
   while (run_block()) {
   }
-  radius_.end();
   if (program.first_fault != 0 && !log_.has_error()) {
     log_.error("NC200", "this line has text that could not be read; mend what the reader named",
                {program.first_fault, 1});
@@ -186,19 +180,11 @@ void Executor::act(const BlockWords& block, const BlockPlan& plan) {
     if (block.has('D')) tool_edge(block);
     if (block.statements != 0) statements(block);
   }
-  if (radius_.is_on()) check_under_compensation(block, plan);
-  if (block.code(GGroup::radius_compensation) != kNoCode) radius_compensation(block);
   if (block.code(GGroup::length_offset) != kNoCode) tool_length(block);
   if (block.code(GGroup::work_system) != kNoCode) work_system(block);
   set_modes(block);
   if (block.code(GGroup::non_modal) != kNoCode) non_modal(block, plan);
   motion(block, plan);
-  if (is_siemens()) {
-    if (modal_.drilling && plan.axes != 0 && plan.motion != kNoCode)
-      drill_by_call(block, plan, *modal_.drilling);
-    if (block.says(SiemensWord::modal_call) || block.says(SiemensWord::single_call))
-      define_drilling(block, plan);
-  }
   process(block, plan, true);
 }
 

@@ -14,7 +14,6 @@
 #include "formats/nc/modal_state.h"
 #include "formats/nc/program_unit.h"
 #include "formats/nc/spline_curve.h"
-#include "formats/nc/tool_radius.h"
 #include "formats/nc/tool_table.h"
 #include "formats/nc/word_values.h"
 
@@ -24,10 +23,9 @@ namespace smoothpost::nc {
 ///
 /// One object runs one program. What a block does in which order stands in executor.cpp, motion in
 /// execute_motion.cpp, cycles in execute_cycles.cpp, splines in execute_splines.cpp, offsets in
-/// execute_offsets.cpp, tools in execute_tools.cpp, cutter radius in execute_radius.cpp, process
-/// words and comments in execute_process.cpp, loops and branches in execute_flow.cpp, calls in
-/// execute_calls.cpp, saved modal state in execute_saved_state.cpp, what only other controls have
-/// in execute_dialects.cpp and execute_siemens.cpp.
+/// execute_offsets.cpp, tools in execute_tools.cpp, process words and comments in
+/// execute_process.cpp, loops and branches in execute_flow.cpp, calls in execute_calls.cpp, saved
+/// modal state in execute_saved_state.cpp, what only other controls have in execute_dialects.cpp.
 class Executor {
  public:
   Executor(const Program& program, const InterpreterSettings& settings, const EventMatcher& matcher,
@@ -59,8 +57,6 @@ class Executor {
   void message(std::string_view text, std::uint32_t line, std::uint32_t column);
   void dwell(const BlockWords& block);
 
-  void radius_compensation(const BlockWords& block);
-  void check_under_compensation(const BlockWords& block, const BlockPlan& plan);
   void tool_length(const BlockWords& block);
   void set_tool_length(double length, int tool, std::uint32_t line);
   void work_system(const BlockWords& block);
@@ -132,11 +128,6 @@ class Executor {
   void set_tcp_by_offset(GCode code);
   void warn_dialect(const BlockWords& block);
   void warn_once(unsigned which, std::string text, const BlockWords& block, std::uint32_t piece);
-  void go_to_label(const FlowStatement& statement);
-  void turn_by_sense(const BlockWords& block, AxisWords& end) const;
-  void point_arc(const BlockWords& block, const BlockPlan& plan);
-  void define_drilling(const BlockWords& block, const BlockPlan& plan);
-  void drill_by_call(const BlockWords& block, const BlockPlan& plan, const DrillingCall& call);
   void turn_axis(const BlockWords& block, const BlockPlan& plan);
   AxisMask absolute_axes(const BlockWords& block, AxisMask axes) const;
 
@@ -160,8 +151,7 @@ class Executor {
   const InputDialect dialect_;
   const InterpreterSettings& settings_;
   const EventMatcher& matcher_;
-  RadiusCompensation radius_;
-  CanonicalSink& sink_;  ///< radius_, behind which the caller's sink is
+  CanonicalSink& sink_;
   DiagnosticLog log_;
   ModalState modal_;
   Coordinates coordinates_;

@@ -142,6 +142,8 @@ RotaryResult optimise_rotaries(const RotaryProblem& problem, const RotarySetting
     QpSettings from = banded;
     from.start = passes.start();
     out.solution = solve_qp(qp, from);
+    // A start from another pass may be a bad one.
+    if (from.start && !near_optimum(out.solution)) out.solution = solve_qp(qp, banded);
     if (!near_optimum(out.solution) && kept) {
       out.status = RotaryStatus::not_converged;
       break;

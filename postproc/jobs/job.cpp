@@ -379,6 +379,7 @@ class Run {
     context_.input_dialect = read.value().dialect;
     const auto& files = read.value().files;
     context_.input_files.insert(context_.input_files.end(), files.begin(), files.end());
+    for (const InputFile& file : files) note({{file.path, file.sha256}});
     return std::move(read.value());
   }
 

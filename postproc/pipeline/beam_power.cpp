@@ -16,117 +16,6 @@ namespace {
 constexpr int kDecimals = 1;  // of a percent
 constexpr const char* kPercent = "percent";
 
-/// Parts of the way to one sample.
-class PowerSplitter {
- public:
-  PowerSplitter(const std::vector<JointSample>& samples, const ReferencePath& reference,
-                const FeedSchedule& schedule, const MachineDefinition& machine)
-      : samples_(samples),
-        reference_(reference),
-        schedule_(schedule),
-        power_(machine.power),
-        least_(machine.cycle.min_block) {
-    for (const PathEvent& e : reference.path().events)
-      commanded_ =
-          commanded_ || (e.kind == PathEvent::Kind::process && e.event.name == event_name::kPower);
-  }
-
-  std::vector<JointSample> run() {
-    std::vector<JointSample> out;
-    out.reserve(samples_.size());
-    for (std::size_t i = 0; i < samples_.size(); ++i) {
-      out.push_back(samples_[i]);
-      if (i == 0 || samples_[i].stretch < 0 || !point_of(i).beam) continue;
-      const std::vector<double> cuts = cuts_before(i);
-      if (cuts.empty()) continue;
-      out.pop_back();
-      double before = start_of(i);
-      for (const double t : cuts) {
-        out.push_back(part(i, t));
-        out.back().time = t - before;
-        before = t;
-      }
-      out.push_back(samples_[i]);
-      out.back().time = samples_[i].stretch_time - before;
-    }
-    return out;
-  }
-
- private:
-  const PathPoint& point_of(std::size_t i) const {
-    return reference_.path().points[samples_[i].segment];
-  }
-  const ScheduledStretch& stretch_of(std::size_t i) const {
-    return schedule_.stretches[static_cast<std::size_t>(samples_[i].stretch)];
-  }
-  double start_of(std::size_t i) const {
-    return samples_[i - 1].stretch == samples_[i].stretch ? samples_[i - 1].stretch_time : 0.0;
-  }
-
-  // The input may command any power up to 100 % at its feed: then the table counts that much more.
-  double scale(std::size_t i) const {
-    if (!commanded_) return 1.0;
-    const double way = reference_.length(samples_[i].segment), time = point_of(i).duration;
-    return 100.0 / std::max(power_.at(time > 0.0 ? way / time : 0.0), 1.0);
-  }
-
-  // Times in the stretch, ascending.
-  std::vector<double> cuts_before(std::size_t i) const {
-    const double from = start_of(i), to = samples_[i].stretch_time;
-    std::vector<double> cuts;
-    if (to - from < 2.0 * least_) return cuts;
-    const auto steps = static_cast<int>(std::min(1e6, std::ceil(2.0 * (to - from) / least_)));
-    const double most = 2.0 * kOfError * power_.error, by = scale(i);
-    double begin = from, before = from, last = 0.0, low = INFINITY, high = 0.0;
-    for (int k = 0; k <= steps; ++k) {
-      const double t = from + (to - from) * k / steps;
-      const double percent = by * power_.at(stretch_of(i).tip_speed(t));
-      const double lower = std::min(low, percent), upper = std::max(high, percent);
-      if (upper - lower > most && before - begin >= least_ && to - before >= least_) {
-        cuts.push_back(before);
-        begin = before;
-        low = std::min(last, percent);
-        high = std::max(last, percent);
-      } else {
-        low = lower;
-        high = upper;
-      }
-      last = percent;
-      before = t;
-    }
-    return cuts;
-  }
-
-  // The sample at time t of the stretch, on the way to sample i.
-  JointSample part(std::size_t i, double t) const {
-    const ScheduledStretch& stretch = stretch_of(i);
-    const auto s = [&](double time) { return stretch.profile.at(time / stretch.slowing).s; };
-    const double from = s(start_of(i)), to = s(samples_[i].stretch_time);
-    const double share = to > from ? std::clamp((s(t) - from) / (to - from), 0.0, 1.0) : 0.0;
-    const JointSample& before = samples_[i - 1];
-    JointSample out = samples_[i];
-    const PathPlace place =
-        place_between(reference_, {before.segment, before.s}, {out.segment, out.s}, share);
-    out.segment = place.segment;
-    out.s = place.s;
-    out.q = stretch.joints.joints_at(s(t));
-    out.guide = false;
-    const double leg_from = before.leg == out.leg ? before.leg_share : 0.0;
-    out.leg_share = leg_from + share * (out.leg_share - leg_from);
-    out.stretch_time = t;
-    return out;
-  }
-
-  static constexpr double kOfError = 0.98;
-
-  const std::vector<JointSample>& samples_;
-  const ReferencePath& reference_;
-  const FeedSchedule& schedule_;
-  const PowerTable& power_;
-  double least_;
-  bool commanded_ = false;
-};
-
 class PowerPlanner {
  public:
   PowerPlanner(MachineProgram& program, const ReferencePath& reference,
@@ -285,13 +174,6 @@ class PowerPlanner {
 };
 
 }  // namespace
-
-std::vector<JointSample> split_at_powers(const std::vector<JointSample>& samples,
-                                         const ReferencePath& reference,
-                                         const FeedSchedule& schedule,
-                                         const MachineDefinition& machine) {
-  return PowerSplitter(samples, reference, schedule, machine).run();
-}
 
 PowerFollowing follow_power(MachineProgram& program, const ReferencePath& reference,
                             const FeedSchedule& schedule, const MachineDefinition& machine) {

@@ -4,21 +4,10 @@
 
 #include "machines/dialects/dialect.h"
 #include "postproc/pipeline/feed_schedule.h"
-#include "postproc/pipeline/joint_plan.h"
 #include "postproc/pipeline/reference_path.h"
 
 // The beam's power by the speed of the tip, as commands of the program.
 namespace smoothpost {
-
-/// Divides the way to a sample where the power of the tip's speed changes by more than
-/// 2·power.error on it (at ramps), so that one command can serve each part: the fewest parts, none
-/// shorter than cycle.min_block. New samples are places of the schedule's own path, between the
-/// places of their neighbours by its parameter. Where the beam is off nothing is divided.
-/// @pre samples are timed (timed_samples())   Cost: two speeds of the tip a cycle.min_block.
-std::vector<JointSample> split_at_powers(const std::vector<JointSample>& samples,
-                                         const ReferencePath& reference,
-                                         const FeedSchedule& schedule,
-                                         const MachineDefinition& machine);
 
 /// What the commands of follow_power() reach.
 struct PowerFollowing {
@@ -35,8 +24,7 @@ struct PowerFollowing {
 /// speeds at its start, middle and end by the schedule. One command serves as many blocks as lie
 /// within power.error of it, and is the middle of what they want; it is given anew after a label, a
 /// power of the input (which it replaces) and a link. Where one block alone wants more than
-/// 2·power.error apart (split_at_powers() found no block that is long enough), the error is what it
-/// is and is returned.
+/// 2·power.error apart, the error is what it is and is returned.
 /// Guarantee (test): the error returned is that of the definition, from the text.
 /// Cost: O(moves).   @pre machine.power has a table, machine has the event `power`
 PowerFollowing follow_power(MachineProgram& program, const ReferencePath& reference,

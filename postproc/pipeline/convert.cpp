@@ -421,8 +421,6 @@ class Converter {
     out_.schedule = std::move(scheduled.value());
     append(out_.diagnostics, schedule_notes(out_.schedule, in_.machine, in_.input_name));
     plan.samples = timed_samples(std::move(plan.samples), out_.schedule);
-    if (follows_power(in_.machine))
-      plan.samples = split_at_powers(plan.samples, reference_, out_.schedule, in_.machine);
     return true;
   }
 

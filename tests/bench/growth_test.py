@@ -49,8 +49,9 @@ TABLE = ["--input-machine", "table_table_ac", "-m", "table_table_bc"]
 CASES = {
     "read, kinematics, print, verify": (program, "ngc", [*TABLE, "--smoothing", "none", "--schedule", "constant",
                                                          "--no-collision-check"], 125, 1000),
-    "corners and schedule": (program, "ngc", [*TABLE, "--no-collision-check"], 50, 400),
-    "robot, corners and schedule": (csv, "csv", ["-m", "robot_6r", "--no-collision-check"], 50, 400),
+    "corners and schedule": (program, "ngc", [*TABLE, "--no-collision-check", "--set", "recipe.dense=corners"], 50, 400),
+    "robot, corners and schedule": (csv, "csv", ["-m", "robot_6r", "--no-collision-check", "--set",
+                                             "recipe.dense=corners"], 50, 400),
 }
 
 

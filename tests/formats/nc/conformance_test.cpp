@@ -5,7 +5,6 @@
 #include <map>
 #include <sstream>
 
-#include "formats/nc/number_text.h"
 #include "tests/formats/nc/recording.h"
 #include "tests/formats/nc/rs274_oracle.h"
 #include "tests/support/support.h"
@@ -59,7 +58,11 @@ struct Refusal {
 
 const std::map<std::string, Refusal>& refusals() {
   static const std::map<std::string, Refusal> kRefusals = {
-      {"ccomp/lathe-comp", {"NC264", "cutter radius compensation of lathe tools in G18"}},
+      {"ccomp/lathe-comp", {"NC202", "cutter radius compensation (G41, G42)"}},
+      {"ccomp/mill-line-arc-entry", {"NC202", "cutter radius compensation (G41)"}},
+      {"interp/crazy-paths", {"NC202", "cutter radius compensation (G41.1)"}},
+      {"interp/inside-corners", {"NC202", "cutter radius compensation (G41.1)"}},
+      {"interp/inverse-time-with-comp", {"NC202", "cutter radius compensation (G42.1)"}},
       {"interp/g33.1", {"NC202", "rigid tapping: the feed follows the spindle"}},
       {"interp/g76", {"NC202", "threading: the feed follows the spindle"}},
       {"interp/g84/g18/g98",
@@ -78,37 +81,30 @@ std::string program_of(const Case& c) {
   return {};
 }
 
-/// Tools of LinuxCNC's tool table beside the program: T1 P1 Z0.511 D0.1 ; comment. Their lengths go
-/// into `settings`; returned are blocks that give their radii.
-std::string add_tools_beside(const fs::path& folder, nc::InterpreterSettings& settings) {
-  std::string lines;
-  if (!fs::exists(folder / "test.tbl")) return lines;
+/// Tools of LinuxCNC's tool table beside the program: T1 P1 Z0.511 D0.1 ; comment.
+std::map<int, double> tools_beside(const fs::path& folder) {
+  std::map<int, double> lengths;
+  if (!fs::exists(folder / "test.tbl")) return lengths;
   std::istringstream text(read_bytes(folder / "test.tbl"));
   for (std::string line; std::getline(text, line);) {
     std::istringstream words(line.substr(0, line.find(';')));
     int tool = 0;
     double z = 0.0;
-    double diameter = 0.0;
     for (std::string word; words >> word;) {
       std::istringstream number(word.substr(1));
       if (word[0] == 'T') number >> tool;
       if (word[0] == 'Z') number >> z;
-      if (word[0] == 'D') number >> diameter;
     }
-    if (tool == 0) continue;
-    settings.tool_lengths[tool] = z * kMillimetresPerInch;
-    if (diameter > 0.0)
-      lines += "G10 L1 P" + std::to_string(tool) + " R" +
-               nc::decimal_text(0.5 * diameter * kMillimetresPerInch, 6) + "\n";
+    if (tool > 0) lengths[tool] = z * kMillimetresPerInch;
   }
-  return lines;
+  return lengths;
 }
 
 /// rs274 alone is an inch machine whose programs begin in millimetres.
 nc::InterpreterSettings settings_of(const fs::path& folder) {
   nc::InterpreterSettings settings = oracle_settings();
   settings.inch_default = true;
-  add_tools_beside(folder, settings);
+  for (const auto& [tool, length] : tools_beside(folder)) settings.tool_lengths[tool] = length;
   settings.subroutine_folders = {folder.string(), (folder / "subs").string()};
   return settings;
 }
@@ -118,9 +114,8 @@ Run run_case(const fs::path& program) {
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   const bool percent = first != std::string::npos && text[first] == '%';
   const std::size_t at = percent ? text.find('\n', first) + 1 : 0;
-  nc::InterpreterSettings settings = settings_of(program.parent_path());
-  text.insert(at, "G21\n" + add_tools_beside(program.parent_path(), settings));
-  return run(text, settings);
+  text.insert(at, "G21\n");
+  return run(text, settings_of(program.parent_path()));
 }
 
 /// The words of a message with one blank between; `behind_first`: without the first one.

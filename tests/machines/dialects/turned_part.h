@@ -20,6 +20,7 @@ inline void require_turned_part(const Dialect& dialect, const MachineDefinition&
       Pose back = Pose::Identity();
       back.linear() = program.part.linear().transpose() * old;
       move.tool = back * move.tool;
+      if (move.duration > 0.0) move.duration += 2.0;  // a feed that a control can be told
     }
     const auto back = read_back(dialect, machine, emitted(dialect, machine, program).text);
     REQUIRE(back.part);

