@@ -101,12 +101,12 @@ class Result:
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("--library", required=True)
+    parser.add_argument("--library", dest="shared_object", required=True)
     parser.add_argument("--header", required=True)
     parser.add_argument("input")
     parser.add_argument("option", nargs="*")
     given = parser.parse_args()
-    smoothpost = Smoothpost(given.library, given.header)
+    smoothpost = Smoothpost(given.shared_object, given.header)
     options = {"command": "convert", "input": given.input}
     kinds = dict(smoothpost.Options._fields_)
     for word in given.option:

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The hosts of examples/plugin, in C and in Python, make what the tool makes, and can cancel.
 
-  plugin_test.py --tool TOOL --host HOST --library LIBRARY --source ROOT --work FOLDER
+  plugin_test.py --tool TOOL --host HOST --shared-object LIBRARY --source ROOT --work FOLDER
 """
 
 import argparse
@@ -19,7 +19,7 @@ def expect(holds, what):
 
 def main():
     parser = argparse.ArgumentParser()
-    for name in ("tool", "host", "library", "source", "work"):
+    for name in ("tool", "host", "shared-object", "source", "work"):
         parser.add_argument(f"--{name}", required=True, type=Path)
     given = parser.parse_args()
     shutil.rmtree(given.work, ignore_errors=True)
@@ -50,7 +50,7 @@ def main():
     module = importlib.util.module_from_spec(spec)
     sys.dont_write_bytecode = True
     spec.loader.exec_module(module)
-    smoothpost = module.Smoothpost(given.library, given.source / "postproc/capi/include/smoothpost/smoothpost.h")
+    smoothpost = module.Smoothpost(given.shared_object, given.source / "postproc/capi/include/smoothpost/smoothpost.h")
     options = {"command": "convert", "input": str(part), "machine": "table_table_bc", "tool": ["1=60"], "output": "-",
                "input_machine": "table_table_ac", "report": "-", "plots": "-"}
     stages = []
