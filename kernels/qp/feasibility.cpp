@@ -56,10 +56,14 @@ void name_limit(const QuadraticProgram& qp, QpFeasibility& out) {
       }
 }
 
-}  // namespace
+/// An answer, and whether the solver came to one.
+struct Decision {
+  QpFeasibility answer;
+  bool solved = false;
+};
 
-QpFeasibility feasibility(const QuadraticProgram& qp, const QpSettings& settings) {
-  Equilibrated scaled = equilibrated(qp);
+/// Solves the elastic form of `qp` in the units of `scaled`.
+Decision decide(const QuadraticProgram& qp, Equilibrated scaled, const QpSettings& settings) {
   QuadraticProgram& elastic = scaled.qp;
   if (!elastic.relaxation) {
     elastic.relaxation.emplace();
@@ -84,7 +88,22 @@ QpFeasibility feasibility(const QuadraticProgram& qp, const QpSettings& settings
   name_limit(elastic, out);
   out.solution = in_given_units(scaled, std::move(out.solution));
   out.solution.objective = objective_value(qp, out.solution.x);
-  return out;
+  return {std::move(out), solved};
+}
+
+/// The programme in the units that it was given in.
+Equilibrated as_given(const QuadraticProgram& qp) {
+  return {qp, Eigen::VectorXd::Ones(qp.layout.size()), Eigen::VectorXd::Ones(qp.row_count())};
+}
+
+}  // namespace
+
+QpFeasibility feasibility(const QuadraticProgram& qp, const QpSettings& settings) {
+  Decision scaled = decide(qp, equilibrated(qp), settings);
+  if (scaled.solved) return std::move(scaled.answer);
+  // Sizes are guessed from bounds and may mislead where only a few of them count.
+  Decision given = decide(qp, as_given(qp), settings);
+  return given.solved ? std::move(given.answer) : std::move(scaled.answer);
 }
 
 }  // namespace smoothpost

@@ -85,7 +85,8 @@ struct QpFeasibility {
 /// relaxed by τ (row_weight, bound_weight of qp.relaxation, or 1). Always by the banded solver.
 /// Levels and rows may be in any units: the programme is solved in units in which its limits are of
 /// the order of 1 (equilibrate.h). Weights that are not given are 1 in those units, which are the
-/// given ones as far as these are within 32 times of them.
+/// given ones as far as these are within 32 times of them. Where the solver has no answer in those
+/// units it is asked again in the given ones.
 QpFeasibility feasibility(const QuadraticProgram& qp, const QpSettings& settings = {});
 
 }  // namespace smoothpost

@@ -1,7 +1,6 @@
 #include "postproc/jobs/job.h"
 
 #include <algorithm>
-#include <cmath>
 #include <exception>
 #include <filesystem>
 #include <map>
@@ -11,11 +10,11 @@
 #include "kernels/core/units.h"
 #include "kernels/geometry/mesh_report.h"
 #include "kernels/geometry/weld.h"
-#include "machines/dialects/decimal.h"
 #include "postproc/jobs/batch.h"
 #include "postproc/jobs/files.h"
 #include "postproc/jobs/finish.h"
 #include "postproc/jobs/golden.h"
+#include "postproc/jobs/job_texts.h"
 #include "postproc/jobs/machine_commands.h"
 #include "postproc/jobs/place.h"
 #include "postproc/jobs/report_files.h"
@@ -35,13 +34,6 @@ namespace {
 constexpr const char* kConversational = "heidenhain";  // a dialect that is a format of its own
 
 std::string base_name(const std::string& path) { return fs::path(path).filename().string(); }
-
-std::string decimal(double value, int digits) {
-  if (!std::isfinite(value)) return "no bound";
-  std::string text;
-  append_decimal(text, value, digits);
-  return text;
-}
 
 /// One run of convert or check: reads the options, runs the pipeline, writes the files.
 class Run {
@@ -277,7 +269,7 @@ class Run {
     }
     in.machine = machine_.definition;
     in.input_name = input_name_;
-    in.title = title(in);
+    in.title = program_title(in, base_name(input_name_), context_.input_sha256);
     return true;
   }
 
@@ -307,7 +299,7 @@ class Run {
       in.placement = place.placement;
       in.placement_text = placement_sentence({system, place.position, place.turn}) +
                           ", a place that smoothpost has found: the part has to stand there";
-      in.title = title(in);
+      in.title = program_title(in, base_name(input_name_), context_.input_sha256);
       return convert(in, forced, progress_);
     };
     const auto placed = first_certified(
@@ -534,36 +526,6 @@ class Run {
     return true;
   }
 
-  // Comments of some controls end at 120 characters.
-  static void add_wrapped(std::string text, std::vector<std::string>& lines) {
-    constexpr std::size_t kLongest = 118;
-    while (text.size() > kLongest) {
-      const std::size_t blank = text.rfind(' ', kLongest);
-      if (blank == std::string::npos || blank == 0) break;
-      lines.push_back(text.substr(0, blank));
-      text.erase(0, blank + 1);
-    }
-    lines.push_back(std::move(text));
-  }
-
-  std::vector<std::string> title(const ConvertInput& in) const {
-    std::vector<std::string> lines;
-    lines.push_back(std::string("smoothpost ") + kVersion + " for machine " +
-                    machine_.definition.name);
-    lines.push_back("input " + base_name(input_name_) + " sha256 " + context_.input_sha256);
-    const bool by_tool = machine_.definition.dialect.mode == "tcp";
-    add_wrapped((by_tool ? "tool tip in the part. " : "machine joints. ") + in.placement_text,
-                lines);
-    std::map<int, double> tools;
-    for (const auto& p : in.input.path.points)
-      if (p.tool > 0) tools[p.tool] = p.tool_length;
-    for (const auto& [tool, length] : tools)
-      lines.push_back(
-          "tool " + std::to_string(tool) + ": length " + decimal(length, 4) +
-          (by_tool ? " mm, as the control has to have it" : " mm is in the joint values"));
-    return lines;
-  }
-
   void report(const Conversion& conversion, const PageParts& parts) {
     add(conversion.diagnostics);
     if (!conversion.program.empty()) context_.program_sha256 = sha256(conversion.program);
@@ -577,7 +539,7 @@ class Run {
     if (wants_page()) make_page(told, parts);
     result_.verdict = to_string(conversion.verdict);
     verdict_ = conversion.verdict;
-    summary(conversion);
+    result_.summary = summary_text(conversion);
   }
 
   void make_page(const Conversion& conversion, const PageParts& parts) {
@@ -586,38 +548,6 @@ class Run {
                               result_.report);
     result_.page = std::move(page.html);
     result_.plots = std::move(page.plots);
-  }
-
-  void summary(const Conversion& conversion) {
-    std::size_t failed = 0;
-    const Check* tip = nullptr;
-    const Check* axis = nullptr;
-    const Check* lead = nullptr;
-    const Check* tilt = nullptr;
-    for (const auto& c : conversion.checks) {
-      if (!c.ok) ++failed;
-      if (c.name == "tip_deviation") tip = &c;
-      if (c.name == "axis_deviation") axis = &c;
-      if (c.name == "lead_deviation") lead = &c;
-      if (c.name == "tilt_deviation") tilt = &c;
-    }
-    std::string text = result_.verdict + " (level " + conversion.level +
-                       "): " + std::to_string(conversion.checks.size()) + " checks, " +
-                       std::to_string(failed) + " failed";
-    const auto share = [](const char* name, const Check* c, const char* unit) {
-      return std::string(name) + " " + decimal(c->value, 5) + " of " + decimal(c->limit, 5) + unit;
-    };
-    if (tip && (axis || lead)) text += "; " + share("tip", tip, " mm");
-    if (tip && axis) text += ", " + share("axis", axis, " deg");
-    if (tip && lead) text += ", " + share("lead", lead, " deg");
-    if (tip && lead && tilt) text += ", " + share("tilt", tilt, " deg");
-    if (conversion.blocks > 0)
-      text += "; " + std::to_string(conversion.blocks) + " blocks, " +
-              decimal(conversion.scheduled_time, 1) + " s planned";
-    const auto& unsaid = conversion.not_checked;
-    for (std::size_t i = 0; i < unsaid.size(); ++i)
-      text += (i == 0 ? "; not checked: " : ", ") + unsaid[i];
-    result_.summary = text;
   }
 
   /// A cancelled run has no program, also when what is left undone was not needed for one or force

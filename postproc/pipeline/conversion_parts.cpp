@@ -222,4 +222,36 @@ std::uint32_t PartCheck::line_of(const ReadBack& read, std::size_t k) {
   return 0;
 }
 
+void describe_input(const ToolPath& path, const std::vector<Cut>& cuts,
+                    const ReferencePath& reference, Conversion& out) {
+  std::vector<bool> in_cut(path.points.size(), false);
+  for (const Cut& cut : cuts) {
+    if (cut.omitted) continue;
+    CutSummary summary;
+    summary.label =
+        "CUT " + std::to_string(cut.number) + (cut.after_rewind ? " goes on after a rewind" : "");
+    summary.first = cut.first;
+    summary.last = cut.last;
+    summary.first_line = path.points[cut.first].line;
+    summary.last_line = path.points[cut.last].line;
+    for (std::uint32_t k = cut.first; k <= cut.last; ++k) {
+      in_cut[k] = true;
+      summary.length += reference.length(k);
+    }
+    summary.phases = phases_of(reference, cut);
+    out.cuts.push_back(std::move(summary));
+  }
+  bool in_link = false;
+  std::vector<bool> omitted(path.points.size(), false);
+  for (const Cut& cut : cuts)
+    for (std::uint32_t k = cut.first; cut.omitted && k <= cut.last; ++k) omitted[k] = true;
+  for (std::size_t k = 1; k < path.points.size(); ++k) {
+    if (omitted[k]) continue;
+    out.programmed_time += path.points[k].duration;
+    out.length += reference.length(k);
+    if (!in_cut[k] && !in_link) ++out.links;
+    in_link = !in_cut[k];
+  }
+}
+
 }  // namespace smoothpost

@@ -113,4 +113,8 @@ void add_clearance(const ClearanceInput& input, const Progress& progress, Conver
 /// What a certificate takes for granted and does not check, whatever the program.
 void describe_promises(const MachineDefinition& machine, bool has_part, Conversion& out);
 
+/// Fills what does not depend on how the program was made: cuts, links, programmed time, length.
+void describe_input(const ToolPath& path, const std::vector<Cut>& cuts,
+                    const ReferencePath& reference, Conversion& out);
+
 }  // namespace smoothpost
