@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "kernels/qp/ipopt_solver.h"
+#include "kernels/qp/ipopt_windows.h"
 
 namespace smoothpost {
 
@@ -13,6 +14,7 @@ constexpr double kWeighty = 1e-7;   // multiplier of a row that is kept
 constexpr double kViolated = 1e-9;  // a row that was left out and has to be added
 constexpr int kMostRounds = 6;
 constexpr double kAccurate = 100.0;  // certificate of an optimum, in tolerances
+constexpr int kOverlap = 64;         // control points that a window has of its neighbour
 
 /// The programme with the rows of `kept` alone, and which rows those are.
 QuadraticProgram with_rows(const QuadraticProgram& qp, const std::vector<bool>& kept,
@@ -71,8 +73,15 @@ QpSolution extended(QpSolution s, const std::vector<int>& which, int rows) {
   return s;
 }
 
+QpSolution solve_rows(const QuadraticProgram& qp, const QpSettings& settings,
+                      const QpSolution& start, int most) {
+  const int controls = qp.layout.channels * qp.layout.controls();
+  if (controls <= most || qp.relaxation) return solve_by_ipopt(qp, settings);
+  return solve_by_windows(qp, settings, start, {most / (2 * qp.layout.channels), kOverlap});
+}
+
 QpSolution solve_near(const QuadraticProgram& qp, const QpSettings& settings,
-                      const QpSolution& banded) {
+                      const QpSolution& banded, int most) {
   std::vector<bool> kept = near_rows(qp, banded);
   QpSolution out;
   int iterations = 0;
@@ -83,7 +92,7 @@ QpSolution solve_near(const QuadraticProgram& qp, const QpSettings& settings,
     QpSettings s = settings;
     s.solver = QpSolver::ipopt;
     s.start = &from;
-    out = solve_by_ipopt(part, s);
+    out = solve_rows(part, s, from, most);
     iterations += out.iterations;
     out.iterations = iterations;
     if (out.status != QpStatus::optimal) return extended(std::move(out), which, qp.row_count());
@@ -105,10 +114,9 @@ QpSolution solve_near(const QuadraticProgram& qp, const QpSettings& settings,
 }  // namespace
 
 QpSolution solve_by_hybrid(const QuadraticProgram& qp, const QpSettings& settings,
-                           const QpSolution& banded) {
-  if (!ipopt_available() || qp.layout.channels * qp.layout.controls() > kMostIpoptControls)
-    return banded;
-  return solve_near(qp, settings, banded);
+                           const QpSolution& banded, int most) {
+  if (!ipopt_available()) return banded;
+  return solve_near(qp, settings, banded, most);
 }
 
 }  // namespace smoothpost

@@ -1,7 +1,5 @@
 #include "kernels/qp/ipopt_solver.h"
 
-#include "kernels/qp/sparse_program.h"
-
 #ifdef SMOOTHPOST_WITH_IPOPT
 
 #include <IpIpoptApplication.hpp>
@@ -128,7 +126,7 @@ class SparseNlp : public Ipopt::TNLP {
   SparsePoint point_;
 };
 
-void set_options(Ipopt::OptionsList& options, const QpSettings& settings) {
+void set_options(Ipopt::OptionsList& options, const QpSettings& settings, bool warm) {
   options.SetIntegerValue("print_level", 0);
   options.SetStringValue("sb", "yes");
   options.SetStringValue("linear_solver", "mumps");
@@ -147,7 +145,7 @@ void set_options(Ipopt::OptionsList& options, const QpSettings& settings) {
   options.SetStringValue("honor_original_bounds", "yes");
   options.SetNumericValue("tol", settings.tolerance);
   options.SetIntegerValue("max_iter", settings.max_iterations);
-  if (settings.start) options.SetStringValue("warm_start_init_point", "yes");
+  if (warm) options.SetStringValue("warm_start_init_point", "yes");
 }
 
 const char* name_of(Ipopt::ApplicationReturnStatus status) {
@@ -181,12 +179,12 @@ const char* name_of(Ipopt::ApplicationReturnStatus status) {
   }
 }
 
-QpStatus status_of(Ipopt::ApplicationReturnStatus status, bool certified) {
-  if (certified) return QpStatus::optimal;
+QpStatus status_of(Ipopt::ApplicationReturnStatus status) {
   switch (status) {
+    case Ipopt::Solve_Succeeded:
+      return QpStatus::optimal;
     case Ipopt::Infeasible_Problem_Detected:
       return QpStatus::infeasible;
-    case Ipopt::Solve_Succeeded:
     case Ipopt::Solved_To_Acceptable_Level:
     case Ipopt::Search_Direction_Becomes_Too_Small:
     case Ipopt::Maximum_Iterations_Exceeded:
@@ -196,58 +194,39 @@ QpStatus status_of(Ipopt::ApplicationReturnStatus status, bool certified) {
   }
 }
 
-SparsePoint zero_point(const SparseProgram& program) {
-  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(program.variables());
-  return {zero, zero, zero, Eigen::VectorXd::Zero(program.rows())};
-}
+}  // namespace
 
-/// Runs Ipopt; its own exceptions and those of its libraries end as a message.
-QpSolution run(const QuadraticProgram& qp, const QpSettings& settings) {
-  const SparseProgram program = sparse_program(qp);
-  SparsePoint start;
-  if (settings.start) start = to_sparse(qp, program, *settings.start);
-  Ipopt::SmartPtr<SparseNlp> nlp = new SparseNlp(program, settings.start ? &start : nullptr);
+// Its own exceptions and those of its libraries end as a message.
+IpoptAnswer ask_ipopt(const SparseProgram& program, const SparsePoint* start,
+                      const QpSettings& settings) {
+  Ipopt::SmartPtr<SparseNlp> nlp = new SparseNlp(program, start);
   Ipopt::ApplicationReturnStatus status = Ipopt::Internal_Error;
-  int iterations = 0;
-  std::string word;
+  IpoptAnswer out;
   // Ipopt 3.11 and MUMPS keep state of the process: one solve at a time, whichever thread asks.
   static std::mutex one_at_a_time;
   const std::lock_guard<std::mutex> alone(one_at_a_time);
   try {
     Ipopt::SmartPtr<Ipopt::IpoptApplication> application = new Ipopt::IpoptApplication(false);
-    set_options(*application->Options(), settings);
+    set_options(*application->Options(), settings, start != nullptr);
     status = application->Initialize("");  // an empty name: no option file
     if (status == Ipopt::Solve_Succeeded) status = application->OptimizeTNLP(GetRawPtr(nlp));
-    word = name_of(status);
+    out.word = name_of(status);
     if (IsValid(application->Statistics())) {
-      iterations = application->Statistics()->IterationCount();
+      out.iterations = application->Statistics()->IterationCount();
     }
   } catch (const std::exception& error) {
-    word = error.what();
+    out.word = error.what();
   } catch (const Ipopt::IpoptException& error) {
-    word = error.Message();
+    out.word = error.Message();
   } catch (...) {
-    word = "unknown exception";
+    out.word = "unknown exception";
   }
-  QpSolution solution = from_sparse(qp, program, nlp->ended() ? nlp->point() : zero_point(program));
-  solution.certificate = certify(qp, solution);
-  const bool certified = nlp->ended() && solution.certificate.kkt() <= 100.0 * settings.tolerance;
-  solution.status = status_of(status, certified);
-  solution.iterations = iterations;
-  if (!certified) solution.message = "Ipopt: " + word;
-  return solution;
+  out.status = status_of(status);
+  if (nlp->ended()) out.point = nlp->point();
+  return out;
 }
-
-}  // namespace
 
 bool ipopt_available() { return true; }
-
-QpSolution solve_by_ipopt(const QuadraticProgram& qp, const QpSettings& settings) {
-  QpSolution solution = run(qp, settings);
-  solution.solver = QpSolver::ipopt;
-  solution.objective = objective_value(qp, solution.x);
-  return solution;
-}
 
 }  // namespace smoothpost
 
@@ -257,19 +236,43 @@ namespace smoothpost {
 
 bool ipopt_available() { return false; }
 
-QpSolution solve_by_ipopt(const QuadraticProgram& qp, const QpSettings&) {
-  const SparseProgram program = sparse_program(qp);
-  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(program.variables());
-  QpSolution solution =
-      from_sparse(qp, program, {zero, zero, zero, Eigen::VectorXd::Zero(program.rows())});
-  solution.status = QpStatus::failed;
-  solution.solver = QpSolver::ipopt;
-  solution.objective = objective_value(qp, solution.x);
-  solution.certificate = certify(qp, solution);
-  solution.message = "built without Ipopt (SMOOTHPOST_WITH_IPOPT=OFF); use the banded solver";
-  return solution;
+IpoptAnswer ask_ipopt(const SparseProgram&, const SparsePoint*, const QpSettings&) {
+  IpoptAnswer out;
+  out.word = "built without Ipopt (SMOOTHPOST_WITH_IPOPT=OFF); use the banded solver";
+  return out;
 }
 
 }  // namespace smoothpost
 
 #endif
+
+namespace smoothpost {
+namespace {
+
+SparsePoint zero_point(const SparseProgram& program) {
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(program.variables());
+  return {zero, zero, zero, Eigen::VectorXd::Zero(program.rows())};
+}
+
+}  // namespace
+
+QpSolution solve_by_ipopt(const QuadraticProgram& qp, const QpSettings& settings) {
+  const SparseProgram program = sparse_program(qp);
+  SparsePoint start;
+  if (settings.start) start = to_sparse(qp, program, *settings.start);
+  const IpoptAnswer answer = ask_ipopt(program, settings.start ? &start : nullptr, settings);
+  QpSolution solution = from_sparse(qp, program, answer.point.value_or(zero_point(program)));
+  solution.certificate = certify(qp, solution);
+  const bool certified = answer.point && solution.certificate.kkt() <= 100.0 * settings.tolerance;
+  const bool unsure = answer.status == QpStatus::optimal && !certified;
+  solution.status = certified ? QpStatus::optimal
+                    : unsure  ? QpStatus::iteration_limit
+                              : answer.status;
+  solution.iterations = answer.iterations;
+  if (!certified) solution.message = "Ipopt: " + answer.word;
+  solution.solver = QpSolver::ipopt;
+  solution.objective = objective_value(qp, solution.x);
+  return solution;
+}
+
+}  // namespace smoothpost

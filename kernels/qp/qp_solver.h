@@ -39,6 +39,7 @@ struct QpSolution {
   Eigen::VectorXd row_lower, row_upper;      ///< multipliers ≥ 0, one a row
   double objective = 0.0;                    ///< with the constant, without cost·τ
   int iterations = 0;
+  int windows = 1;  ///< that it was solved in (hybrid_solver.h)
   QpCertificate certificate;
   std::string message;  ///< the solver's own word when it failed
 };

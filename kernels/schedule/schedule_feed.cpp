@@ -15,6 +15,7 @@ namespace {
 constexpr double kInside = 1e-4;      // share by which limits are lowered where nothing is dilated
 constexpr double kSlope = 0.003;      // by which they sink along a window
 constexpr int kMovingPoints = 13;     // an element, where nothing is dilated
+constexpr int kMovingGrids = 3;       // each of half the elements' size, from a moving start
 constexpr double kWindowShare = 8.0;  // look-aheads of a window, at the speed of the survey
 
 void check(const FeedPath& path, const FeedSettings& settings) {
@@ -124,21 +125,29 @@ class Schedule {
                           {state.rest, goal.rest});
     ++result_.windows;
     const bool moving = !state.rest || !goal.rest;
-    const StretchSettings settings = stretch_settings(moving, last);
+    StretchSettings settings = stretch_settings(moving, last);
     if (!moving) {
       plan.law = solve_resting(stretch, settings);
       result_.raw = larger(result_.raw, plan.law.load());
       const double c = plan.law.dilation() * (1.0 + settings_.margin);
       result_.dilation = std::max(result_.dilation, c);
       dilate(plan.law, c);
-    } else {
+      result_.iterations += plan.law.iterations;
+      return plan;
+    }
+    // A state of a law that uses its limits up may have a way on that the first grid is too coarse
+    // for.
+    for (int grid = 0; grid < kMovingGrids; ++grid) {
       plan.law =
           solve_moving(stretch, {moving_end(stretch, state), moving_end(stretch, goal)}, settings);
-      result_.raw = larger(result_.raw, plan.law.load());
+      result_.iterations += plan.law.iterations;
+      if (plan.law.converged && plan.law.load().largest() <= 1.0) {
+        result_.raw = larger(result_.raw, plan.law.load());
+        return plan;
+      }
+      settings.element_time *= 0.5;
     }
-    result_.iterations += plan.law.iterations;
-    if (moving && !(plan.law.converged && plan.law.load().largest() <= 1.0)) return std::nullopt;
-    return plan;
+    return std::nullopt;
   }
 
   /// The first window. From a given speed there is nothing to fall back on.

@@ -85,7 +85,8 @@ bool ChebyshevPath::append(const Function& f, double from, double to,
     const Coefficients c = values * transform<kPoints>();
     const PathValue range = 0.5 * (values.rowwise().maxCoeff() - values.rowwise().minCoeff());
     const PathValue tail = c.rightCols<2>().cwiseAbs().rowwise().maxCoeff();
-    if ((tail.array() <= settings.relative * range.array() + settings.absolute).all()) {
+    if ((tail.array() <= settings.relative * range.array() + settings.absolute).all() &&
+        (pieces() == before || meets(c, range))) {
       coefficients_.push_back(c);
       ends_.push_back(end);
       at = end;
@@ -138,9 +139,10 @@ bool ChebyshevPath::append_jets(const JetFunction& f, double from, double to,
       const ChebyshevJet& wanted = jets[static_cast<std::size_t>(i)];
       const Basis t = basis(node(i, kJets))[0];
       const PathValue value = c * t, slope = first * t;
-      const auto range = (jets[0][0] - jets[kJets - 1][0]).array().abs();
+      const PathValue range = (jets[0][0] - jets[kJets - 1][0]).cwiseAbs();
+      if (i > 0 && pieces() > before) resolved = resolved && meets(c, range);
       resolved = resolved &&
-                 ((value - wanted[0]).array().abs() <= settings.value * (1.0 + range)).all() &&
+                 ((value - wanted[0]).array().abs() <= settings.value * (1.0 + range.array())).all() &&
                  (slope - wanted[1]).norm() <= 1e-6 * (wanted[1].norm() + centre[1].norm());
     }
     if (resolved) {
@@ -157,6 +159,12 @@ bool ChebyshevPath::append_jets(const JetFunction& f, double from, double to,
     }
   }
   return true;
+}
+
+// A jump of the function may lie between the last point of one piece and the first of the next.
+bool ChebyshevPath::meets(const Coefficients& next, const PathValue& range) const {
+  const PathValue end = coefficients_.back() * basis(1.0)[0], start = next * basis(-1.0)[0];
+  return ((end - start).array().abs() <= kMeets * (1.0 + range.array())).all();
 }
 
 void ChebyshevPath::shorten(std::size_t pieces) {

@@ -142,7 +142,7 @@ struct DialectSettings {
   std::string extension = "ngc";
   int digits_length = 5;      ///< decimals of lengths, in `units`
   int digits_angle = 6;       ///< decimals of angles, in degrees
-  double block_time = 0.010;  ///< s
+  double block_time = 0.0;    ///< s; 0: as is best for the control
   bool line_numbers = true;
   std::vector<std::string> start;
   std::vector<std::string> end;

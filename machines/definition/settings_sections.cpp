@@ -191,6 +191,8 @@ ToleranceBudget read_budget(TableReader reader, const RecipeSettings& recipe) {
   return budget;
 }
 
+constexpr double kLeastTolerance = 1e-6;  // mm, deg
+
 }  // namespace
 
 ToleranceSettings read_tolerance(TableReader reader, const RecipeSettings& recipe) {
@@ -203,6 +205,15 @@ ToleranceSettings read_tolerance(TableReader reader, const RecipeSettings& recip
   tolerance.clearance = reader.number_or("clearance_mm", 0.0, Bound::not_negative);
   tolerance.event = reader.number_or("event_mm", tolerance.event, Bound::positive);
   tolerance.limit_share = reader.number_or("limit_share", 1.0, Bound::positive);
+  const auto least = [&reader](const char* key, double value) {
+    if (value > 0.0 && value < kLeastTolerance)
+      reader.error("MF108",
+                   std::string(key) + " is " + to_text(value) +
+                       " and has to be at least 0.000001: no control resolves less",
+                   key);
+  };
+  least("tip_mm", tolerance.tip);
+  least("axis_deg", degrees_from_radians(tolerance.axis));
   if (tolerance.limit_share > 1.0)
     reader.error("MF108",
                  "limit_share is " + to_text(tolerance.limit_share) + " and has to be at most 1",
@@ -286,7 +297,6 @@ int read_length_digits(TableReader& reader, const std::string& units) {
 }
 
 void read_block_time(TableReader& reader, const CycleSettings& cycle, DialectSettings& dialect) {
-  dialect.block_time = std::max(0.010, cycle.min_block);
   const auto milliseconds = reader.number("block_ms", Bound::positive);
   if (!milliseconds) return;
   dialect.block_time = *milliseconds * kSecondsPerMillisecond;

@@ -6,14 +6,16 @@
 #include <cmath>
 
 #include "kernels/core/units.h"
+#include "postproc/pipeline/block_steps.h"
 #include "postproc/pipeline/finish_resolve.h"
 
 namespace smoothpost {
 
 namespace {
 
-constexpr double kBlock = 0.25;  // mm, least usual length of a block
-constexpr double kUsed = 0.8;    // of the chord share: it is looked at in quarters alone
+constexpr double kBlock = 0.25;       // mm, least usual length of a block
+constexpr double kLeastBlock = 1e-3;  // mm
+constexpr double kUsed = 0.8;         // of the chord share: it is looked at in quarters alone
 
 std::string number(double value) {
   std::string text = std::to_string(std::round(1e3 * value) / 1e3);
@@ -193,7 +195,7 @@ class Planner {
   void sample(const FinishCut& cut, Made& made) const {
     const FinishJoints& joints = *made.cut.joints;
     const double tool_length = resolver_.tool_length(cut);
-    const double usual = std::max(kBlock, in_.machine.dialect.block_time * resolver_.feed());
+    const double usual = std::max(kBlock, usual_block_time(in_.machine) * resolver_.feed());
     double s = 0.0;
     JointVector from = joints.joints(0.0);
     JointSample start;  // the end of the link: the cut's first point
@@ -204,14 +206,11 @@ class Planner {
     made.s.push_back(0.0);
     while (s < cut.length()) {
       const double rest = cut.length() - s;
-      double step = rest / std::ceil(rest / usual - 1e-9);
-      JointVector to = joints.joints(s + step);
-      while (step > 1e-3 && !chord_holds(joints, tool_length, s, s + step, from, to)) {
-        step *= 0.5;
-        to = joints.joints(s + step);
-      }
+      const double step = longest_step(rest, usual, kLeastBlock, [&](double length) {
+        return chord_holds(joints, tool_length, s, s + length, from, joints.joints(s + length));
+      });
       s = rest - step < 1e-9 ? cut.length() : s + step;
-      if (s == cut.length()) to = joints.joints(s);
+      const JointVector to = joints.joints(s);
       made.samples.push_back(sample_at(cut, s, to));
       made.s.push_back(s);
       from = to;

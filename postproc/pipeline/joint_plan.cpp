@@ -1,6 +1,7 @@
 #include "postproc/pipeline/joint_plan.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 
@@ -19,6 +20,10 @@ constexpr double kRotaryStep =
 constexpr double kTurnCap =
     1.5;  // of the cap: where the first rotary may turn with the axis on the pole
 constexpr int kMaxSplits = 40;
+constexpr double kOnPole = 1e-8;                         // rad
+constexpr double kRadialTurn = 5.0 * kRadiansPerDegree;  // of a radial leg, about the pole
+constexpr double kNearPole = 0.01;  // of a radial leg: where it is looked at for the pole
+constexpr int kRimRounds = 40, kRimSteps = 16;  // to find the rim of the cap, and the way to it
 
 double nearest_turn(double angle, double reference) {
   return angle + 2.0 * kPi * std::round((reference - angle) / (2.0 * kPi));
@@ -33,6 +38,9 @@ class Planner {
     // path.
     pole_ = jacobian(pair.chain(), settings.held).col(pair.first_rotary()).head<3>().normalized();
     cap_ = 0.4 * settings.axis_tolerance;
+    radial_.assign(path.legs() + 1, false);
+    for (std::size_t leg = 1; leg <= path.legs(); ++leg)
+      if (!replanned(leg)) radial_[leg] = is_radial(leg);
   }
 
   Result<JointPlan> run() {
@@ -47,6 +55,7 @@ class Planner {
       JointSample to = tracked_[i];
       to.q = tracking.q[i];
       to.branch = tracking.branch[i];
+      turn_with_path(tracking, i, to);
       if (i > 0 && !replanned(to.segment)) {
         const JointSample from = at_start_of(samples_.back(), to.segment);
         if (!refine(from, to, 0))
@@ -97,7 +106,7 @@ class Planner {
     LocationJet target{pose->tip, VectorJet::Zero()};
     for (std::size_t r = 0; r < 4; ++r)
       target.axis.col(static_cast<Eigen::Index>(r)) = pose->rotation[r].col(2);
-    if (in_cap(target.axis.col(0))) {
+    if (on_pole(leg, target.axis.col(0))) {
       target.axis = constant_jet(target.axis.col(0).dot(pole_) > 0.0 ? pole_ : Vec3(-pole_));
       const int first = pair_.first_rotary();
       free[static_cast<std::size_t>(first)] = false;
@@ -120,11 +129,40 @@ class Planner {
     return sample;
   }
 
+  // A leg that leaves the cap straight from its end inside it, or goes there: its joints are smooth
+  // up to that end as they are, so the cap is no help.
+  bool is_radial(std::size_t leg) const {
+    const Vec3 first = path_.at(leg, 0.0).axis, last = path_.at(leg, 1.0).axis;
+    if (in_cap(first) == in_cap(last)) return false;
+    const double end = in_cap(first) ? 0.0 : 1.0;
+    const Vec3& inside = in_cap(first) ? first : last;
+    if (in_cap(inside, kOnPole / cap_)) return true;
+    const Vec3 rim = path_.at(leg, rim_between(leg, end, 1.0 - end)).axis;
+    const auto sideways = [this](const Vec3& axis) {
+      return (axis - pole_ * pole_.dot(axis)).normalized();
+    };
+    return angle_between(sideways(inside), sideways(rim)) < kRadialTurn;
+  }
+
+  // A share of the leg outside the cap where it leaves it, from one inside to one outside.
+  double rim_between(std::size_t leg, double inside, double outside) const {
+    for (int k = 0; k < kRimRounds; ++k) {
+      const double middle = 0.5 * (inside + outside);
+      (in_cap(path_.at(leg, middle).axis) ? inside : outside) = middle;
+    }
+    return outside;
+  }
+
+  // Whether the pose at that place of the path is put onto the pole.
+  bool on_pole(std::size_t segment, const Vec3& axis, double cap_share = 1.0) const {
+    return in_cap(axis, radial_[segment] ? kOnPole / cap_ : cap_share);
+  }
+
   // The pose asked of the chain: of the holder, with an axis inside the cap put onto the pole.
   CutterLocation target(std::size_t segment, double s, double cap_share = 1.0) const {
     CutterLocation location = path_.at(segment, s);
     const double tool_length = path_.point(segment).tool_length;
-    if (in_cap(location.axis, cap_share))
+    if (on_pole(segment, location.axis, cap_share))
       location.axis = location.axis.dot(pole_) > 0.0 ? pole_ : Vec3(-pole_);
     return holder_location(location, tool_length);
   }
@@ -209,6 +247,55 @@ class Planner {
     s.held = settings_.held;
     s.pole_cap = cap_ * 1e-3;  // axes inside the cap stand on the pole already
     return track_branches(pair_, points, s);
+  }
+
+  // On the pole the first rotary is free, and tracking leaves it where a neighbour has it. Where
+  // the path leaves the pole on one side alone, it belongs where the joints of that side come from:
+  // as they go on to the pole from outside its cap.
+  void turn_with_path(const BranchTracking& tracking, std::size_t i, JointSample& at_pole) {
+    const JointSample& pole = tracked_[i];
+    if (!on_pole(pole.segment, path_.at(pole.segment, pole.s).axis)) return;
+    const auto leaves = [this](const JointSample& to) {
+      return !in_cap(path_.at(to.segment, to.s).axis);
+    };
+    const bool before = i > 0 && !replanned(pole.segment) && leaves(tracked_[i - 1]);
+    const bool behind =
+        i + 1 < tracked_.size() && !replanned(tracked_[i + 1].segment) && leaves(tracked_[i + 1]);
+    if (before == behind) return;
+    const std::size_t neighbour = before ? i - 1 : i + 1;
+    const std::size_t segment = before ? pole.segment : tracked_[neighbour].segment;
+    const auto share = [&](const JointSample& s) { return s.segment == segment ? s.s : 0.0; };
+    const double end = share(pole), from = share(tracked_[neighbour]);
+    const double outside =
+        radial_[segment] ? end + kNearPole * (from - end) : rim_between(segment, end, from);
+    // By three places of equal distances that end at the pole.
+    const double step = std::min(std::abs(outside - end), 0.25 * std::abs(from - end));
+    if (!(std::abs(outside - end) <= 2.0 * step)) return;
+    const double sign = from > end ? 1.0 : -1.0;
+    const int first = pair_.first_rotary();
+    JointVector q = tracking.q[neighbour];
+    std::array<double, 3> turn{};
+    const auto go_to = [&](double place_share) {
+      JointSample there;
+      there.segment = static_cast<std::uint32_t>(segment);
+      there.s = place_share;
+      if (!place(there, q, 1.0)) return false;
+      q = there.q;
+      return true;
+    };
+    const double far = outside + 2.0 * sign * step;
+    for (int k = 1; k <= kRimSteps; ++k)
+      if (!go_to(from + (far - from) * k / kRimSteps)) return;
+    for (std::size_t k = 3; k-- > 0;) {
+      if (!go_to(outside + sign * step * static_cast<double>(k))) return;
+      turn[k] = q[first];
+    }
+    const double t = -std::abs(outside - end) / step;  // of the pole, with the rim at 0
+    JointVector wanted = at_pole.q;
+    wanted[first] = turn[0] + t * (turn[1] - turn[0]) +
+                    0.5 * t * (t - 1.0) * (turn[2] - 2.0 * turn[1] + turn[0]);
+    JointSample turned = at_pole;
+    if (place(turned, wanted, 1.0)) at_pole = std::move(turned);
   }
 
   // Splits [from, to] until straight joint motion follows the reference; appends the samples
@@ -342,6 +429,7 @@ class Planner {
   }
 
   const SmoothedPath& path_;
+  std::vector<bool> radial_;  ///< one a leg
   const RotaryPair& pair_;
   const JointPlanSettings settings_;
   const Progress& progress_;

@@ -16,9 +16,11 @@ namespace smoothpost {
 
 namespace {
 
-constexpr double kSameTime = 1e-9;       // s
-constexpr double kTimeDigit = 0.5e-6;    // s, half of the last one printed
-constexpr double kSlack = 1e-6;          // relative, of the comparison in doubles
+constexpr double kSameTime = 1e-9;     // s
+constexpr double kTimeDigit = 0.5e-6;  // s, half of the last one printed
+constexpr double kSlack = 1e-6;        // relative, of the comparison in doubles
+constexpr double kGoodPairing = 0.3;   // of the tolerance: not looked for a better one
+constexpr int kPairingSteps = 8, kPairingRounds = 24;
 constexpr const char* kWait = "dwell";   // as the readers of dialects name it (ReadBackEvent)
 constexpr std::size_t kMoreColumns = 7;  // tip, axis, beam
 
@@ -112,7 +114,7 @@ class StreamMotionBuilder {
     pass_to(static_cast<std::size_t>(item.move));
     const LineMapEntry& move = in_.deviation.map[static_cast<std::size_t>(item.move)];
     if (move.role != MoveRole::path) return push(k, {});
-    const PathPlace to = place_on(item, move, time);
+    const PathPlace to = nearest(place_on(item, move, time), rows_[k].q);
     LineMapEntry entry;
     entry.role = MoveRole::path;
     entry.segment = to.segment;
@@ -166,6 +168,85 @@ class StreamMotionBuilder {
         share = std::clamp((s(item.from + done) - ends_[0]) / (ends_[1] - ends_[0]), 0.0, 1.0);
     }
     return place_between(in_.deviation.reference, from, to, share);
+  }
+
+  CutterLocation tool_at(const JointVector& q, std::uint32_t segment) const {
+    const CutterLocation holder = forward_location(in_.deviation.chain, q);
+    const double length = in_.deviation.reference.path().points[segment].tool_length;
+    return {holder.tip - length * holder.axis, holder.axis};
+  }
+
+  /// How far a tool is from a place of the input, in tolerances.
+  double distance(const CutterLocation& tool, const PathPlace& place) const {
+    const auto& tolerance = in_.machine.tolerance;
+    const CutterLocation wanted = in_.deviation.reference.at(place.segment, place.s);
+    const bool free = in_.deviation.orientation && in_.deviation.orientation->free;
+    const double tip = (tool.tip - wanted.tip).norm() / tolerance.tip;
+    return free ? tip : std::hypot(tip, (tool.axis - wanted.axis).norm() / tolerance.axis);
+  }
+
+  // A row belongs to the place of the input that it is nearest to, which is not quite the share of
+  // its block that the law has done: blocks go by the length of the input, and one that is divided
+  // for the latency of an event by its time. Any pairing in order is a right one.
+  PathPlace nearest(const PathPlace& guess, const JointVector& q) const {
+    const CutterLocation tool = tool_at(q, guess.segment);
+    const double off = distance(tool, guess);
+    if (off < kGoodPairing || guess.segment == 0) return guess;
+    const double reach =
+        2.0 * (tool.tip - in_.deviation.reference.at(guess.segment, guess.s).tip).norm();
+    const PathPlace first = moved_back(guess, reach), last = moved_on(guess, reach);
+    const auto at = [&](double t) {
+      return place_between(in_.deviation.reference, first, last, t);
+    };
+    const auto cost = [&](double t) { return distance(tool, at(t)); };
+    double best = 0.0, least = INFINITY;
+    for (int k = 0; k <= kPairingSteps; ++k) {
+      const double t = static_cast<double>(k) / kPairingSteps, c = cost(t);
+      if (c >= least) continue;
+      least = c;
+      best = t;
+    }
+    double low = std::max(0.0, best - 1.0 / kPairingSteps);
+    double high = std::min(1.0, best + 1.0 / kPairingSteps);
+    for (int k = 0; k < kPairingRounds; ++k) {
+      const double third = (high - low) / 3.0;
+      if (cost(low + third) < cost(high - third))
+        high -= third;
+      else
+        low += third;
+    }
+    const double t = 0.5 * (low + high);
+    return cost(t) < off ? at(t) : guess;
+  }
+
+  // So far before or behind a place on the same run, and not before the last row's.
+  PathPlace moved_back(PathPlace place, double way) const {
+    const auto& points = in_.deviation.reference.path().points;
+    while (true) {
+      const bool same = in_run_ && place.segment == last_.segment;
+      const double floor = same ? last_.s : 0.0;
+      const double length = in_.deviation.reference.length(place.segment);
+      const double part = length * (place.s - floor);
+      if (part >= way && length > 0.0) return {place.segment, place.s - way / length};
+      if (same || place.segment <= 1 || points[place.segment - 1].replanned)
+        return {place.segment, floor};
+      way -= part;
+      place = {place.segment - 1, 1.0};
+    }
+  }
+
+  PathPlace moved_on(PathPlace place, double way) const {
+    const auto& reference = in_.deviation.reference;
+    while (true) {
+      const double length = reference.length(place.segment);
+      const double part = length * (1.0 - place.s);
+      if (part >= way && length > 0.0) return {place.segment, place.s + way / length};
+      if (place.segment >= reference.segments() ||
+          reference.path().points[place.segment + 1].replanned)
+        return {place.segment, 1.0};
+      way -= part;
+      place = {place.segment + 1, 0.0};
+    }
   }
 
   // All joints stand: no motion, but a wait that the beam's rules know.

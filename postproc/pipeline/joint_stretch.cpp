@@ -346,11 +346,25 @@ class StretchBuilder {
       }
       end_pieces(sub, place(shares[b]), rate_of(leg, extent));
     }
+    if (!meets_samples(before)) {
+      drop_pieces(before, sub_before);
+      return false;
+    }
     stop_if_rough(before, leg_first_ - 1);
     const double shift = now_.length() - extent - start;  // of s, when a new stretch began
     for (std::size_t i = leg_first_; i <= leg_last_; ++i)
       now_.sample_s.push_back(start + shift + share_of(i) * extent);
     return true;
+  }
+
+  // What was appended from piece `first` on goes from the sample before the leg to its last one.
+  // The function may jump beside its ends, where a rotary is free at a pole.
+  bool meets_samples(std::size_t first) const {
+    if (now_.pieces() == first) return true;
+    const std::size_t sub = first == 0 ? 0 : now_.sub_end[first - 1];
+    const ChebyshevPath& path = now_.path;
+    return same_place(path.value(sub, path.from(sub)), leg_first_ - 1) &&
+           same_place(path.value(path.pieces() - 1, now_.length()), leg_last_);
   }
 
   // Ends a piece at `at`, and further ones where `path` was halved often since its piece `sub`:

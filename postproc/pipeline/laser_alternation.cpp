@@ -114,8 +114,7 @@ std::optional<StretchPlanner::Shape> StretchPlanner::reshaped() const {
   RotarySettings settings = settings_;
   if (settings_.hybrid) settings.solver.solver = QpSolver::banded;
   settings.hybrid = false;
-  Shape shape;
-  if (law_) shape.law.emplace(*law_);
+  Shape shape{law_, {}, {}, {}, {}};
   shape.rotaries = optimise_rotaries(rotary_problem(), settings);
   if (shape.rotaries.status != RotaryStatus::optimal) return {};
   StandoffOptions options = standoff_options(1.0);

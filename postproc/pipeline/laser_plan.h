@@ -19,6 +19,7 @@ struct QpReport {
   std::string status;
   double objective = 0.0;
   int iterations = 0;
+  int windows = 1;  ///< that it was solved in, one after the other
   double kkt = 0.0;
   double violation = 0.0;
 };

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "postproc/pipeline/block_steps.h"
+
 namespace smoothpost {
 
 namespace {
 
 constexpr double kUsed = 0.8;        // of the chord share: it is looked at in quarters alone
 constexpr double kSamePlace = 1e-9;  // of u
+constexpr double kLeastStep = 1e-4;  // of u
 
 bool chord_holds(const LaserSampling& in, double from, double to, const JointVector& a,
                  const JointVector& b) {
@@ -39,7 +42,7 @@ void add(const LaserSampling& in, double u, const JointVector& q, LaserSamples& 
 
 LaserSamples sample_path(const LaserSampling& in, double rate) {
   LaserSamples out;
-  const double usual = in.machine.dialect.block_time * rate;
+  const double usual = usual_block_time(in.machine) * rate;
   double u = in.path.first(), shortest = INFINITY;
   JointVector from = in.path.joints(u);
   out.samples.push_back(in.start);
@@ -48,15 +51,13 @@ LaserSamples sample_path(const LaserSampling& in, double rate) {
   for (const double stop : in.stops) {
     while (u < stop - kSamePlace) {
       const double rest = stop - u;
-      double step = rest / std::ceil(rest / usual - 1e-9);
-      JointVector to = in.path.joints(u + step);
-      while (step > 1e-4 && !chord_holds(in, u, u + step, from, to)) {
-        step *= 0.5;
-        to = in.path.joints(u + step);
-      }
+      double step = longest_step(rest, usual, kLeastStep, [&](double s) {
+        return chord_holds(in, u, u + s, from, in.path.joints(u + s));
+      });
       if (rest - step < kSamePlace) step = rest;
       shortest = std::min(shortest, step);
       u = rest - step < kSamePlace ? stop : u + step;
+      const JointVector to = in.path.joints(u);
       add(in, u, to, out);
       from = to;
     }

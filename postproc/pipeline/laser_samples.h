@@ -29,7 +29,7 @@ struct LaserSamples {
   double rate = 0.0;      ///< of u by time, 1/s; below the one asked for when blocks are too short
 };
 
-/// Blocks of dialect.block_time at du/dt = rate, shorter where straight motion of the joints leaves
+/// Blocks of usual_block_time() at du/dt = rate, shorter where straight motion of the joints leaves
 /// the path by more than the chord share of the tolerances at a quarter of its way; all of them
 /// slower when one would be shorter than cycle.min_block.   Cost: about 10 µs a block.
 LaserSamples sample_path(const LaserSampling& input, double rate);

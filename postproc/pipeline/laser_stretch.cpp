@@ -555,7 +555,7 @@ std::optional<Diagnostic> StretchPlanner::solve_standoff(double rate) {
 
 void StretchPlanner::tell(const char* name, const QpSolution& s) {
   report_.qp.push_back({name, to_string(s.solver), to_string(s.status), s.objective, s.iterations,
-                        s.certificate.kkt(), s.certificate.violation});
+                        s.windows, s.certificate.kkt(), s.certificate.violation});
 }
 
 void StretchPlanner::note_slow(const std::string& why, double u) {

@@ -50,6 +50,7 @@ Json qp_json(const QpReport& q) {
           {"status", q.status},
           {"objective", number(q.objective)},
           {"iterations", q.iterations},
+          {"windows", q.windows},
           {"kkt", number(q.kkt)},
           {"violation", number(q.violation)}};
 }

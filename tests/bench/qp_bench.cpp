@@ -7,6 +7,7 @@
 #include <random>
 
 #include "kernels/core/contract.h"
+#include "kernels/qp/hybrid_solver.h"
 #include "kernels/qp/qp_solver.h"
 #include "kernels/spline/bspline_jerk.h"
 
@@ -168,6 +169,20 @@ BENCHMARK(bm_banded)->Arg(100)->Arg(628)->Arg(5000)->Arg(50000)->Unit(benchmark:
 
 void bm_ipopt(benchmark::State& state) { solve(state, QpSolver::ipopt); }
 BENCHMARK(bm_ipopt)->Arg(100)->Arg(628)->Arg(5000)->Unit(benchmark::kMillisecond);
+
+// Ipopt's last word on what the banded solver has found; above kMostIpoptControls by windows.
+void bm_hybrid(benchmark::State& state) {
+  const Problem& problem = problem_of(state.range(0));
+  const QpSolution banded = solve_qp(problem.limited);
+  QpSolution solution;
+  for (auto _ : state) solution = solve_by_hybrid(problem.limited, {}, banded);
+  if (solution.status != QpStatus::optimal) state.SkipWithError("not optimal");
+  state.counters["iterations"] = solution.iterations;
+  state.counters["windows"] = solution.windows;
+  state.counters["kkt"] = solution.certificate.kkt();
+  state.counters["gain"] = banded.objective - solution.objective;
+}
+BENCHMARK(bm_hybrid)->Arg(628)->Arg(5000)->Arg(50000)->Unit(benchmark::kMillisecond);
 
 /// The same programme written for Ipopt alone: x, v, a, j divided by their limits, the differences
 /// as equations, limits as bounds, the Gram matrix of the quadratic basis as Hessian.

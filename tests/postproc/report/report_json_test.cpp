@@ -104,7 +104,7 @@ TEST_CASE("report_json: what was optimised in a cut", "[postproc][report]") {
   a.via_points = 2;
   a.passes = 6;
   a.normal_from_part = true;
-  a.qp.push_back({"rotary", "ipopt", "optimal", 0.125, 11, 1e-10, 2e-12});
+  a.qp.push_back({"rotary", "ipopt", "optimal", 0.125, 11, 1, 1e-10, 2e-12});
   b = a;
   b.first = 6;
   b.last = 9;
@@ -139,6 +139,7 @@ TEST_CASE("report_json: what was optimised in a cut", "[postproc][report]") {
                                         {"status", "optimal"},
                                         {"objective", 0.125},
                                         {"iterations", 11},
+                                        {"windows", 1},
                                         {"kkt", 1e-10},
                                         {"violation", 2e-12}}));
   REQUIRE(cut["slowed_by"].size() == 2);
