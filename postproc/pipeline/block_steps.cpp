@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "postproc/pipeline/process_check.h"
-
 namespace smoothpost {
 
 namespace {
@@ -18,7 +16,7 @@ double usual_block_time(const MachineDefinition& machine) {
   if (d.block_time > 0.0) return std::max(d.block_time, machine.cycle.min_block);
   double time = kShortBlock;
   if (d.name == "linuxcnc" && d.path_mode == "exact")
-    time = follows_power(machine) ? kPowerBlock : kLongBlock;
+    time = kLongBlock;
   return std::max(time, machine.cycle.min_block);
 }
 

@@ -9,13 +9,11 @@ namespace smoothpost {
 /// The time (s) that a block of a smooth path has where nothing asks for a shorter one:
 /// dialect.block_ms, or what makes the execution fastest on this control. LinuxCNC in exact-path
 /// mode stops at every end of a block that turns a rotary (measured: docs/controllers/linuxcnc.md),
-/// so that the longest blocks are the fastest: kLongBlock, or kPowerBlock where the program
-/// commands the power by the speed, once a block. On controls that were not measured: kShortBlock.
-/// Never below cycle.min_block.
+/// so that the longest blocks are the fastest: kLongBlock. On controls that were not measured:
+/// kShortBlock. Never below cycle.min_block.
 double usual_block_time(const MachineDefinition& machine);
 
 inline constexpr double kShortBlock = 0.010;  ///< s
-inline constexpr double kPowerBlock = 0.020;  ///< s
 inline constexpr double kLongBlock = 0.250;   ///< s
 
 /// The next step of a path of which `rest` is left: at most `usual`, such that holds(step); the

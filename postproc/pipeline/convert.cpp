@@ -9,6 +9,7 @@
 #include "kernels/optimise/shape_tuning.h"
 #include "postproc/pipeline/arm_plan.h"
 #include "postproc/pipeline/beam_power.h"
+#include "postproc/pipeline/block_steps.h"
 #include "postproc/pipeline/clearance_check.h"
 #include "postproc/pipeline/controller_blending.h"
 #include "postproc/pipeline/conversion_notes.h"
@@ -669,7 +670,16 @@ class Converter {
 }  // namespace
 
 Conversion convert(const ConvertInput& in, bool force, const Progress& progress) {
-  return Converter(in, force, progress).run();
+  Conversion made = Converter(in, force, progress).run();
+  // One power a block: in long blocks the speed may change too much for it.
+  const bool chosen = in.machine.dialect.block_time <= 0.0;
+  const auto too_long = [](const Check& c) { return c.name == "power_follows_speed" && !c.ok; };
+  if (!chosen || usual_block_time(in.machine) <= kShortBlock ||
+      std::none_of(made.checks.begin(), made.checks.end(), too_long))
+    return made;
+  ConvertInput shorter = in;
+  shorter.machine.dialect.block_time = kShortBlock;
+  return Converter(shorter, force, progress).run();
 }
 
 }  // namespace smoothpost

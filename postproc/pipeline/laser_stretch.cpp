@@ -219,13 +219,15 @@ bool StretchPlanner::fit(double spacing, int every, bool explain) {
   return true;
 }
 
-// Of the programmed axis, on the branch and turn of the base plan at the start.
+// Of the programmed axis, on the branch and turn of the base plan at the start. On a pole the first
+// rotary is where it was, and at the end where the base plan, and so what comes next, has it.
 void StretchPlanner::seed_rotaries(Grid& g) const {
   const ScrewChain& chain = in_.laser.pair.chain();
   const std::optional<Inverse> inverse = Inverse::from(chain);
   JointVector near = base_[first_sample_].q;
   for (const CutterLocation& location : g.location) {
     Pose tip = Pose::Identity();
+    if (&location == &g.location.back()) near = base_[end_sample_ - 1].q;
     tip.translation() = location.tip;
     tip.linear() =
         Eigen::Quaterniond::FromTwoVectors(chain.tool_axis, location.axis).toRotationMatrix();

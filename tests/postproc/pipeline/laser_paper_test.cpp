@@ -157,7 +157,7 @@ TEST_CASE("laser_plan: a shape that is no faster is not kept",
           "[postproc][pipeline][laser][paper]") {
   // Sooner or later a pass gains nothing any more: it is tried and left out.
   const auto all =
-      case2({{"tool.min_gap_mm", "0"}, {"recipe.schedule", "jerk"}, {"recipe.alternations", "8"}});
+      case2({{"tool.min_gap_mm", "0"}, {"recipe.schedule", "jerk"}, {"recipe.alternations", "40"}});
   if (!all) return;
   REQUIRE(all->verdict == Verdict::certified);
   const AlternationReport report = all->stretches.front().alternation;
