@@ -1,7 +1,7 @@
-#include <charconv>
 
 #include "formats/cl/executor.h"
 #include "formats/nc/number_text.h"
+#include "kernels/core/signed_number.h"
 
 namespace smoothpost::cl {
 namespace {
@@ -28,8 +28,7 @@ bool four_numbers(std::string_view text, std::array<double, 4>& out) {
     if (begin == std::string_view::npos) return count == out.size();
     if (count == out.size()) return false;
     text.remove_prefix(begin);
-    if (text.front() == '+') text.remove_prefix(1);
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out[count++]);
+    const auto [end, error] = from_signed(text, out[count++]);
     if (error != std::errc()) return false;
     text.remove_prefix(static_cast<std::size_t>(end - text.data()));
     if (!text.empty() && text.front() != ' ' && text.front() != '\t' && text.front() != ',')

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "kernels/core/process.h"
+#include "kernels/core/signed_number.h"
 #include "kernels/core/units.h"
 
 namespace smoothpost {
@@ -269,10 +270,9 @@ class Reader {
 
   double number(Column column) {
     const Field& from = field(column);
-    std::string_view digits = from.text;
-    if (digits.size() > 1 && digits.front() == '+') digits.remove_prefix(1);
+    const std::string_view digits = from.text;
     double value = 0.0;
-    const auto end = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    const auto end = from_signed(digits, value);
     if (end.ec == std::errc::invalid_argument || end.ptr != digits.data() + digits.size()) {
       complain(
           "CSV106", from,

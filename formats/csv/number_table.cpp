@@ -1,8 +1,9 @@
 #include "formats/csv/number_table.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
+
+#include "kernels/core/signed_number.h"
 
 namespace smoothpost {
 
@@ -81,11 +82,10 @@ class Reader {
     }
     std::vector<double> values;
     for (std::size_t i = 0; i < fields_.size(); ++i) {
-      std::string_view field = fields_[i];
-      if (!field.empty() && field.front() == '+') field.remove_prefix(1);
+      const std::string_view field = fields_[i];
       double value = 0.0;
       const char* end = field.data() + field.size();
-      const auto [next, fault] = std::from_chars(field.data(), end, value);
+      const auto [next, fault] = from_signed(field, value);
       if (fault != std::errc() || next != end)
         error("CSV106",
               table_.columns[i] + ": `" + std::string(field.substr(0, 64)) + "` is no number",

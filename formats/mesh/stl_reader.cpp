@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <assimp/Importer.hpp>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <optional>
 #include <utility>
+
+#include "kernels/core/signed_number.h"
 
 namespace smoothpost {
 
@@ -254,10 +255,9 @@ class TextJudge {
   bool read_numbers(int count, bool coordinates) {
     for (int i = 0; i < count; ++i) {
       const Token token = scan_.next();
-      std::string_view digits = token.text;
-      if (digits.size() > 1 && digits.front() == '+') digits.remove_prefix(1);
+      const std::string_view digits = token.text;
       double value = 0.0;
-      const auto end = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+      const auto end = from_signed(digits, value);
       if (end.ec == std::errc::invalid_argument || end.ptr != digits.data() + digits.size()) {
         complain(token, "expected a number");
         return false;

@@ -1,9 +1,9 @@
 #include <yaml.h>
 
-#include <charconv>
 #include <cmath>
 
 #include "formats/urdf/urdf.h"
+#include "kernels/core/signed_number.h"
 
 namespace smoothpost::urdf {
 
@@ -165,8 +165,7 @@ class Reader {
     Quantity* q = quantity(raw, key.substr(4));
     if (q == nullptr) return;
     double number = 0.0;
-    const char* first = text.data() + (!text.empty() && text[0] == '+' ? 1 : 0);
-    const auto [end, fault] = std::from_chars(first, text.data() + text.size(), number);
+    const auto [end, fault] = from_signed(text, number);
     if (fault != std::errc() || end != text.data() + text.size() || !(std::abs(number) <= kLargest))
       error("MF203", raw.joint + ": " + key_ + " is \"" + text + "\", not a number", line);
     (lowest ? q->lowest : q->highest) = number + 0.0;

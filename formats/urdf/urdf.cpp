@@ -2,10 +2,11 @@
 
 #include <tinyxml2.h>
 
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <set>
+
+#include "kernels/core/signed_number.h"
 
 namespace smoothpost::urdf {
 
@@ -132,9 +133,8 @@ class Reader {
   static std::optional<double> take(std::string_view& text) {
     while (!text.empty() && std::string_view(" \t\r\n").find(text.front()) != text.npos)
       text.remove_prefix(1);
-    if (!text.empty() && text.front() == '+') text.remove_prefix(1);
     double value = 0.0;
-    const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const auto [end, fault] = from_signed(text, value);
     if (fault != std::errc() || !(std::abs(value) <= kLargest)) return std::nullopt;
     text.remove_prefix(static_cast<std::size_t>(end - text.data()));
     return value + 0.0;
