@@ -1,7 +1,8 @@
 #include "formats/ini/ini.h"
 
-#include <charconv>
 #include <cmath>
+
+#include "kernels/core/signed_number.h"
 
 namespace smoothpost::ini {
 
@@ -115,10 +116,9 @@ Result<File> read_ini(std::string_view text, const std::string& file, const Sour
 std::optional<double> leading_number(std::string_view value) {
   constexpr double kLargest = 1e9;
   value = trimmed(value);
-  if (!value.empty() && value.front() == '+') value.remove_prefix(1);
   double number = 0.0;
   const char* end = value.data() + value.size();
-  const auto [next, fault] = std::from_chars(value.data(), end, number);
+  const auto [next, fault] = from_signed(value, number);
   if (fault != std::errc() || !(std::abs(number) <= kLargest)) return std::nullopt;
   if (next != end && std::string_view(" \t#;").find(*next) == std::string_view::npos)
     return std::nullopt;

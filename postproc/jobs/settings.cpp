@@ -10,6 +10,7 @@
 
 #include "formats/mesh/stl_reader.h"
 #include "kernels/core/nearest_name.h"
+#include "kernels/core/signed_number.h"
 #include "kernels/core/units.h"
 #include "kernels/geometry/weld.h"
 #include "postproc/jobs/files.h"
@@ -82,9 +83,8 @@ Diagnostic no_dialect(const std::string& name) {
 std::optional<double> read_number(std::string_view text) {
   while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
   while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
-  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
   double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const auto [end, error] = from_signed(text, value);
   if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return {};
   return value;
 }

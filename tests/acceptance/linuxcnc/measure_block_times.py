@@ -1,9 +1,9 @@
 #!/usr/bin/python3
 """Measures what LinuxCNC makes of emitted programs: time, acceleration and jerk, for several block times.
 
-    measure_block_times.py --smoothpost TOOL --machine MACHINE.toml [--blocks 4,10,20,50,100] [--raw FILE] -- CONVERT_ARGUMENTS...
+    measure_block_times.py --smoothpost TOOL --machine MACHINE.toml [--blocks 4,10,20,50,100,default] [--raw FILE] -- CONVERT_ARGUMENTS...
 
-Every block time is a conversion of its own (`dialect.block_ms`) whose program runs in the headless
+Every block time is a conversion of its own (`dialect.block_ms`; `default`: what the tool chooses) whose program runs in the headless
 LinuxCNC; `--raw` runs a joint-level program as it is, before. Printed (markdown): the executed time over
 the planned one and the peaks of the logged joints, by differences at 1 ms, over the limits of the
 machine file. The last line is the schedule itself, by the same differences of the `--trajectory` file: what
@@ -76,7 +76,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("--machine", required=True)
     parser.add_argument("--smoothpost", required=True)
-    parser.add_argument("--blocks", default="4,10,20,50,100", help="block times, ms")
+    parser.add_argument("--blocks", default="4,10,20,50,100,default", help="block times, ms")
     parser.add_argument("--raw", help="a joint-level program of the same machine")
     parser.add_argument("arguments", nargs=argparse.REMAINDER)
     options = parser.parse_args()
@@ -98,7 +98,7 @@ def main():
             made = subprocess.run(
                 [options.smoothpost, "convert", *[a for a in options.arguments if a != "--"], "-m", options.machine,
                  "-o", program, "--json", report, "--trajectory", trajectory, "--progress", "none",
-                 "--set", f"dialect.block_ms={block}", "--set", "cycle.time_ms=1"],
+                 *([] if block == "default" else ["--set", f"dialect.block_ms={block}"]), "--set", "cycle.time_ms=1"],
                 capture_output=True, text=True, check=False)
             if made.returncode != 0:
                 print(f"| {block} ms | not certified: exit {made.returncode} | | | | | |")
@@ -109,7 +109,7 @@ def main():
             _, rows, _ = read_trajectory(trajectory)
             moving = np.flatnonzero(np.abs(np.diff(rows, axis=0)).max(axis=1) > 0)
             planned = (moving[-1] - moving[0] + 1) * CYCLE
-            row(f"{block} ms", told["output"]["blocks"], planned, len(joints) * CYCLE, peaks(joints, bounds))
+            row(block if block == "default" else f"{block} ms", told["output"]["blocks"], planned, len(joints) * CYCLE, peaks(joints, bounds))
         names, rows, _ = read_trajectory(trajectory)
         moving = np.flatnonzero(np.abs(np.diff(rows, axis=0)).max(axis=1) > 0)
         planned = (moving[-1] - moving[0] + 1) * CYCLE
