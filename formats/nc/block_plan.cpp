@@ -182,7 +182,7 @@ LetterMask BlockPlanner::letters_of_g_codes(const BlockWords& block) const {
   LetterMask used = 0;
   const GCode mode0 = block.code(GGroup::non_modal);
   if (is_arc(plan_.motion)) used |= letter_bit('P') | letter_bit('R');
-  if (plan_.motion > 30) used |= letters_of_motion(block);
+  if (plan_.motion > 30 && plan_.motion != kPointArc) used |= letters_of_motion(block);
   if (mode0 == 40) used |= letter_bit('P');
   if (mode0 == 100) used |= letter_bit('L') | letter_bit('P') | letter_bit('R');
   if (sets_tool_data(block)) used |= letter_bit('Q');

@@ -13,6 +13,7 @@ const BlockWords& BlockReader::read(std::size_t index) {
   block_.line = static_cast<std::uint32_t>(index) + 1;
   block_.input_line = input_line_ == 0 ? block_.line : input_line_;
   block_.letters = block_.absolute = block_.incremental = 0;
+  block_.senses = 0;
   block_.statements = 0;
   block_.statement_piece = block_.flow_piece = BlockWords::kNone;
   block_.g.fill(kNoCode);
@@ -130,6 +131,10 @@ void BlockReader::add_value(const Piece& piece, std::uint32_t index) {
     const LetterMask bit = letter_bit(piece.letter);
     if (form == WordForm::absolute) block_.absolute |= bit;
     if (form == WordForm::incremental) block_.incremental |= bit;
+    if (form >= WordForm::shortest) {
+      block_.absolute |= bit;
+      block_.senses |= static_cast<std::uint32_t>(form) << (8 * (piece.letter - 'A'));
+    }
   }
   put(piece, index, found.value);
 }

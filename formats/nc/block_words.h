@@ -16,12 +16,12 @@ struct InterpreterSettings;
 class ParameterStore;
 
 /// A set of word letters: bit 0 is A, bit 25 is Z, then the addresses of more than one letter.
-using LetterMask = std::uint32_t;
+using LetterMask = std::uint64_t;
 
 constexpr int letter_index(char letter) { return letter - 'A'; }
 constexpr LetterMask letter_bit(char letter) { return LetterMask{1} << letter_index(letter); }
 
-inline constexpr int kAddresses = 32;
+inline constexpr int kAddresses = 36;
 
 /// The components of the tool axis.
 inline constexpr LetterMask kVectorMask =
@@ -41,6 +41,7 @@ struct BlockWords {
   LetterMask letters = 0;        ///< all but G, M, N, O
   LetterMask absolute = 0;       ///< words with AC()
   LetterMask incremental = 0;    ///< words with IC()
+  std::uint32_t senses = 0;      ///< WordForm of A, B, C with DC(), ACP(), ACN(), 8 bits each
   std::array<double, kAddresses> value;
   std::array<std::uint32_t, kAddresses> piece;
   std::array<GCode, kGGroups> g;

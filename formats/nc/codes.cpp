@@ -212,6 +212,7 @@ constexpr Row kSiemensRows[] = {
     {6450, GGroup::path_control, kRead, "path blending"},
     {7000, GGroup::units, kRead, "inch, feed too"},
     {7100, GGroup::units, kRead, "millimetre, feed too"},
+    {kPointArc, GGroup::motion, kRead, "arc through a point"},
 };
 
 constexpr std::size_t kTableSize = 10000;
@@ -250,6 +251,7 @@ const GCodeInfo& g_code_info(GCode code, InputDialect dialect) {
 }
 
 std::string g_code_text(GCode code) {
+  if (code == kPointArc) return "CIP";
   std::string text = "G" + std::to_string(code / 10);
   if (code % 10 != 0) text += "." + std::to_string(code % 10);
   return text;

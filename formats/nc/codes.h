@@ -13,6 +13,7 @@ inline constexpr GCode kNoCode = -1;
 
 inline constexpr GCode kSplineEnd = 53;   ///< G5.3
 inline constexpr GCode kMacroCall = 650;  ///< G65 of the Fanuc family
+inline constexpr GCode kPointArc = 9999;  ///< CIP of siemens, which has no number
 
 /// Rank of m_rank() for what acts after the motion of its line.
 inline constexpr int kAfterMotion = 7;

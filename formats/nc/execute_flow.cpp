@@ -63,6 +63,11 @@ void Executor::flow(const BlockWords& block) {
     case Kind::macro_if_goto:
     case Kind::macro_if_then:
       return macro(statement);
+    case Kind::label_goto:
+      return go_to_label(statement);
+    case Kind::label_if_goto:
+      if (holds(statement) && !stopped_) go_to_label(statement);
+      return;
     default:
       return loop(statement, number);
   }

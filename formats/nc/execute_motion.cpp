@@ -59,6 +59,7 @@ AxisWords Executor::target(const BlockWords& block, AxisMask axes) const {
       world[i] =
           (absolute & bit(i)) == 0 ? world[i] + value : value + (frame[i] + shift[i]) + origin[i];
     }
+    turn_by_sense(block, world);
     return world;
   }
   AxisWords program = coordinates_.program_from_world(coordinates_.world());
@@ -67,7 +68,9 @@ AxisWords Executor::target(const BlockWords& block, AxisMask axes) const {
     const double value = word_value(block, i);
     program[i] = (absolute & bit(i)) == 0 ? program[i] + value : value;
   }
-  return coordinates_.world_from_program(program);
+  AxisWords world = coordinates_.world_from_program(program);
+  turn_by_sense(block, world);
+  return world;
 }
 
 AxisWords Executor::machine_target(const BlockWords& block, AxisMask axes) const {
@@ -158,7 +161,7 @@ void Executor::motion(const BlockWords& block, const BlockPlan& plan) {
   const GCode mode = block.code(GGroup::motion);
   const GCode before = modal_.motion;
   if (mode != kNoCode) change_mode(mode, block);
-  if (plan.motion > 30) return expanded_motion(block, plan, before);
+  if (plan.motion > 30 && plan.motion != kPointArc) return expanded_motion(block, plan, before);
   if (plan.motion == kNoCode || plan.motion == kRefusedMotion) return;
   const bool feeds = plan.motion != 0;
   const bool arc_motion = plan.motion == 20 || plan.motion == 30;
@@ -166,7 +169,9 @@ void Executor::motion(const BlockWords& block, const BlockPlan& plan) {
     coordinates_.move_to(target(block, plan.axes), unknown_at_target(block, plan.axes));
     return;
   }
-  if (arc_motion) {
+  if (plan.motion == kPointArc) {
+    point_arc(block, plan);
+  } else if (arc_motion) {
     arc(block, plan);
   } else if (plan.axes != 0 || plan.vector != 0) {
     straight(block, plan);

@@ -185,6 +185,12 @@ void Executor::act(const BlockWords& block, const BlockPlan& plan) {
   set_modes(block);
   if (block.code(GGroup::non_modal) != kNoCode) non_modal(block, plan);
   motion(block, plan);
+  if (is_siemens()) {
+    if (modal_.drilling && plan.axes != 0 && plan.motion != kNoCode)
+      drill_by_call(block, plan, *modal_.drilling);
+    if (block.says(SiemensWord::modal_call) || block.says(SiemensWord::single_call))
+      define_drilling(block, plan);
+  }
   process(block, plan, true);
 }
 

@@ -23,9 +23,10 @@ namespace smoothpost::nc {
 ///
 /// One object runs one program. What a block does in which order stands in executor.cpp, motion in
 /// execute_motion.cpp, cycles in execute_cycles.cpp, splines in execute_splines.cpp, offsets in
-/// execute_offsets.cpp, tools in execute_tools.cpp, process words and comments in
-/// execute_process.cpp, loops and branches in execute_flow.cpp, calls in execute_calls.cpp, saved
-/// modal state in execute_saved_state.cpp, what only other controls have in execute_dialects.cpp.
+/// execute_offsets.cpp, tools in execute_tools.cpp, process
+/// words and comments in execute_process.cpp, loops and branches in execute_flow.cpp, calls in
+/// execute_calls.cpp, saved modal state in execute_saved_state.cpp, what only other controls have
+/// in execute_dialects.cpp and execute_siemens.cpp.
 class Executor {
  public:
   Executor(const Program& program, const InterpreterSettings& settings, const EventMatcher& matcher,
@@ -128,6 +129,11 @@ class Executor {
   void set_tcp_by_offset(GCode code);
   void warn_dialect(const BlockWords& block);
   void warn_once(unsigned which, std::string text, const BlockWords& block, std::uint32_t piece);
+  void go_to_label(const FlowStatement& statement);
+  void turn_by_sense(const BlockWords& block, AxisWords& end) const;
+  void point_arc(const BlockWords& block, const BlockPlan& plan);
+  void define_drilling(const BlockWords& block, const BlockPlan& plan);
+  void drill_by_call(const BlockWords& block, const BlockPlan& plan, const DrillingCall& call);
   void turn_axis(const BlockWords& block, const BlockPlan& plan);
   AxisMask absolute_axes(const BlockWords& block, AxisMask axes) const;
 

@@ -4,6 +4,10 @@
 #include <tuple>
 #include <unordered_set>
 
+#include "formats/nc/number.h"
+#include "formats/nc/siemens_flow.h"
+#include "formats/nc/siemens_words.h"
+
 namespace smoothpost::nc {
 namespace {
 
@@ -15,7 +19,7 @@ const char* keyword_of(Kind kind) {
   constexpr const char* kNames[] = {"sub",   "endsub", "call",      "return", "while",  "endwhile",
                                     "do",    "repeat", "endrepeat", "if",     "elseif", "else",
                                     "endif", "break",  "continue",  "GOTO",   "IF",     "IF",
-                                    "WHILE", "DO",     "END"};
+                                    "WHILE", "DO",     "END",       "GOTO",   "IF"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 
@@ -99,13 +103,15 @@ class Pairing {
   }
 
   void open(std::uint32_t number) {
-    const bool macro =
-        now(number).text.kind == Kind::macro_while || now(number).text.kind == Kind::macro_do;
+    // Those of siemens have no labels.
+    const bool macro = now(number).text.kind == Kind::macro_while ||
+                       now(number).text.kind == Kind::macro_do || now(number).text.label.empty();
     // Loop numbers of macros are used again and again, but not within each other.
     bool fresh = true;
     if (macro) {
       for (const std::uint32_t other : open_) {
-        fresh = fresh && now(other).text.label != now(number).text.label;
+        fresh = fresh &&
+                (now(other).text.label != now(number).text.label || now(number).text.label.empty());
       }
     } else {
       fresh = used_.insert(now(number).text.label).second;
@@ -222,7 +228,25 @@ bool is_oword(Kind kind) { return kind < Kind::macro_goto; }
 
 FlowText read(const Program& program, const Piece& piece) {
   const std::string_view text = std::string_view(program.text).substr(piece.begin, piece.length);
+  if (program.dialect == InputDialect::siemens) return read_siemens_flow(text);
   return is_oword(static_cast<Kind>(piece.detail)) ? read_o_line(text) : read_macro_line(text);
+}
+
+std::string_view text_of(const Program& program, const Piece& piece) {
+  return std::string_view(program.text).substr(piece.begin, piece.length);
+}
+
+/// NAME: of a Sinumerik program.
+bool is_label(const Program& program, const Piece& piece) {
+  return program.dialect == InputDialect::siemens && piece.kind == PieceKind::statement &&
+         text_of(program, piece).back() == ':';
+}
+
+std::string label_name(const Program& program, const Piece& piece) {
+  std::string name = upper_text(text_of(program, piece));
+  name.pop_back();
+  while (!name.empty() && detail::is_blank(name.back())) name.pop_back();
+  return name;
 }
 
 }  // namespace
@@ -273,6 +297,8 @@ FlowIndex index_flow(const Program& program) {
         if (!fresh) label->second.twice = true;
         index.regions.push_back(b);
         if (numbers) pairing.end_region();
+      } else if (is_label(program, piece)) {
+        index.labels[label_name(program, piece)].push_back(b);
       } else if (numbers && piece.kind == PieceKind::word && piece.letter == 'N') {
         index.numbers.push_back({region, label_number(piece.value), b});
       }

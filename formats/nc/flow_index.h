@@ -42,7 +42,8 @@ struct FlowIndex {
   std::unordered_map<std::string, std::uint32_t> subs;  ///< sub statements by label
   std::map<long, ProgramLabel> programs;                ///< O numbers that stand alone
   std::vector<std::uint32_t> regions;                   ///< their blocks, rising
-  std::vector<Numbered> numbers;                        ///< sorted; the Fanuc family only
+  std::vector<Numbered> numbers;                        ///< sorted; not of linuxcnc
+  std::unordered_map<std::string, std::vector<std::uint32_t>> labels;  ///< siemens NAME:, by block
 
   /// The statement of a block; @pre the block has one.
   std::uint32_t of_block(std::uint32_t block) const;

@@ -10,8 +10,8 @@
 
 namespace smoothpost::nc {
 
-/// What a line of program flow does: the O words of RS274NGC, then the macro statements of the
-/// Fanuc family.
+/// What a line of program flow does: the O words of RS274NGC (IF and WHILE of siemens too), then
+/// the macro statements of the Fanuc family, then the jumps of siemens.
 enum class FlowKind : std::uint8_t {
   sub,
   endsub,
@@ -33,7 +33,9 @@ enum class FlowKind : std::uint8_t {
   macro_if_then,
   macro_while,
   macro_do,
-  macro_end
+  macro_end,
+  label_goto,  ///< siemens GOTO, GOTOF, GOTOB
+  label_if_goto
 };
 
 /// A line of program flow, taken apart. Offsets count in the text that was read.
@@ -46,6 +48,7 @@ struct FlowText {
   std::vector<std::size_t> values;     ///< where the condition, count, arguments begin
   std::size_t target = kNone;          ///< where the number behind GOTO begins
   std::size_t consequence = kNone;     ///< where the assignment behind THEN begins
+  int direction = 0;                   ///< siemens: 1 GOTOF, -1 GOTOB
   std::size_t length = 0;              ///< bytes of the whole statement
   std::string problem;                 ///< empty: it can be read
   std::size_t at = 0;                  ///< offset of the fault

@@ -24,11 +24,20 @@ struct CycleMemory {
   bool incremental = false;  ///< G91 at the series' last block
 };
 
+/// CYCLE81 and CYCLE82 of siemens: heights in program coordinates, mm; s.
+struct DrillingCall {
+  double retract = 0.0;
+  double clearance = 0.0;
+  double depth = 0.0;
+  double dwell = 0.0;
+};
+
 /// The modal state of RS274NGC but for coordinates; the values are those at the start of a program.
 struct ModalState {
   GCode motion = kNoCode;
   GCode base_motion = 0;  ///< the last of G0 to G3, which G80 goes back to in the Fanuc family
   CycleMemory cycle;
+  std::optional<DrillingCall> drilling;  ///< siemens MCALL
   GCode plane = 170;
   bool incremental = false;
   bool arc_absolute = false;

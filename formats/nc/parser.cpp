@@ -108,12 +108,6 @@ class Rs274Builder final : public TreeBuilder {
     return scanned.next;
   }
 
-  bool words_besides_n() const {
-    return words_in_line_ && program_.pieces.back().letter != 'N' &&
-           !(program_.pieces.back().kind == PieceKind::space && program_.pieces.size() > 1 &&
-             program_.pieces[program_.pieces.size() - 2].letter == 'N');
-  }
-
   const char* no_number(char letter, const char* begin, const char* value) {
     if (letter == 'O') return o_word(begin);
     if (!is_linuxcnc() && begins_macro(rest_of_line(begin))) return macro(begin);

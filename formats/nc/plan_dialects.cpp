@@ -135,6 +135,9 @@ LetterMask BlockPlanner::letters_of_dialect(const BlockWords& block,
     if (is_arc(plan_.motion)) {
       used |= letter_bit(kCircleRadius) | letter_bit(kCircleTurns);
     }
+    if (plan_.motion == kPointArc) {
+      used |= letter_bit(kThroughX) | letter_bit(kThroughY) | letter_bit(kThroughZ);
+    }
     if (block.says(SiemensWord::rot) || block.says(SiemensWord::arot)) {
       used |= letter_bit(kPlaneAngle);
     }

@@ -34,7 +34,10 @@ enum class WordForm : std::uint8_t {
   expression,   ///< to be computed from the text when the block runs
   absolute,     ///< siemens X=AC(..): the same, whatever G90 or G91 says
   incremental,  ///< siemens X=IC(..)
-  name          ///< siemens T="DRILL"
+  name,         ///< siemens T="DRILL"
+  shortest,     ///< siemens C=DC(..): absolute, the shorter way round
+  upwards,      ///< siemens C=ACP(..)
+  downwards     ///< siemens C=ACN(..)
 };
 
 /// Addresses of more than one letter, behind Z in a word's `letter`.
@@ -44,6 +47,9 @@ inline constexpr char kAxisVectorZ = 'Z' + 3;   ///< C3
 inline constexpr char kCircleRadius = 'Z' + 4;  ///< CR
 inline constexpr char kCircleTurns = 'Z' + 5;   ///< TURN
 inline constexpr char kPlaneAngle = 'Z' + 6;    ///< RPL
+inline constexpr char kThroughX = 'Z' + 7;      ///< I1
+inline constexpr char kThroughY = 'Z' + 8;      ///< J1
+inline constexpr char kThroughZ = 'Z' + 9;      ///< K1
 
 struct Piece {
   PieceKind kind = PieceKind::space;

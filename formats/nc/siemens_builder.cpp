@@ -2,7 +2,9 @@
 
 #include <cstring>
 
+#include "formats/nc/codes.h"
 #include "formats/nc/number_text.h"
+#include "formats/nc/siemens_flow.h"
 
 namespace smoothpost::nc {
 namespace {
@@ -168,15 +170,64 @@ const char* SiemensBuilder::name(const char* begin, const char* name_end) {
   if (next == '=' && (behind + 1 == line_end_ || behind[1] != '=')) {
     return assigned(begin, name_end, behind);
   }
+  if (is_siemens_flow(text)) return flow(begin);
+  if (upper_text(text) == "MCALL") return modal_call(begin, name_end);
+  if (upper_text(text) == "CIP") {
+    ScannedNumber code;
+    code.value = kPointArc / 10.0;
+    code.next = name_end;
+    push_word('G', begin, code);
+    return name_end;
+  }
   if (next == '(') return call(begin, name_end);
   if (next == '[') return array(begin, behind);
-  if (next == ':' && !words_in_line_) return statement(SiemensWord::no_effect, begin, behind + 1);
+  if (next == ':' && !words_besides_n())
+    return statement(SiemensWord::no_effect, begin, behind + 1);
   if (upper_text(text) == "DEF") return declaration(begin, name_end);
   const SiemensWord word = siemens_keyword(text);
   if (word != SiemensWord::none) return statement(word, begin, name_end);
   if (text.size() == 1) return push_construct({Construct::letter_alone, 1}, begin);
   // What follows the first word of a command or jump belongs to it.
   return refuse_name(begin, name_end, end_of_statement(begin));
+}
+
+/// IF, ELSE, WHILE, GOTOF ...: a line of its own but for its number.
+const char* SiemensBuilder::flow(const char* begin) {
+  const char* end = end_of_statement(begin);
+  const std::string_view text(begin, static_cast<std::size_t>(end - begin));
+  if (words_besides_n()) {
+    return push_refused("NC150", "a line of program flow has other words before it", text);
+  }
+  const FlowText read = read_siemens_flow(text);
+  if (!read.ok()) {
+    error("NC150", "the line of program flow cannot be read: " + read.problem, begin + read.at);
+  }
+  push(read.ok() ? PieceKind::flow : PieceKind::construct, begin, end);
+  program_.pieces.back().detail = static_cast<std::uint8_t>(read.kind);
+  program_.has_flow = program_.has_flow || read.ok();
+  words_in_line_ = words_seen_ = true;
+  return end;
+}
+
+/// MCALL alone, or before a cycle.
+const char* SiemensBuilder::modal_call(const char* begin, const char* name_end) {
+  const char* cycle = skip_blanks(name_end);
+  if (cycle == line_end_ || *cycle == ';')
+    return statement(SiemensWord::modal_call, begin, name_end);
+  const char* cycle_end = behind_name(cycle);
+  const char* open = skip_blanks(cycle_end);
+  const std::string_view name(cycle, static_cast<std::size_t>(cycle_end - cycle));
+  const char* end = open != line_end_ && *open == '(' ? behind_group(open, ')') : cycle_end;
+  const bool closed = end > cycle && end[-1] == ')';
+  if (!closed || siemens_call(name, "0") != SiemensWord::single_call) {
+    const char* const refused = end > cycle_end ? end : end_of_statement(begin);
+    const std::string_view cycle_name(cycle, static_cast<std::size_t>(cycle_end - cycle));
+    error("NC140", siemens_refusal(cycle_name.substr(0, 60)), cycle);
+    push(PieceKind::construct, begin, refused);
+    words_in_line_ = words_seen_ = true;
+    return refused;
+  }
+  return statement(SiemensWord::modal_call, begin, end);
 }
 
 const char* SiemensBuilder::array(const char* begin, const char* bracket) {
@@ -240,17 +291,23 @@ const char* SiemensBuilder::address(const char* begin, char address, const char*
   const char* open = skip_blanks(name_end);
   if (open != line_end_ && *open == '(') {
     const std::string mode = upper_text({value, static_cast<std::size_t>(name_end - value)});
-    if (mode == "DC" || mode == "ACP" || mode == "ACN" || mode == "CDC" || mode == "CIC" ||
-        mode == "CAC" || mode == "CACP" || mode == "CACN") {
+    const bool rotary = address >= 'A' && address <= 'C';
+    const bool sense = mode == "DC" || mode == "ACP" || mode == "ACN";
+    if ((sense && !rotary) || mode == "CDC" || mode == "CIC" || mode == "CAC" || mode == "CACP" ||
+        mode == "CACN") {
       const char* end = behind_group(open, ')');
       return push_refused("NC141",
                           mode +
-                              "(): a rotary position by the shorter way, a sense or an index is "
-                              "not read; let the CAM post write plain positions",
+                              "(): a position by an index, or a sense of an axis other than A, B "
+                              "and C, is not read; let the CAM post write plain positions",
                           {begin, static_cast<std::size_t>(end - begin)});
     }
-    if (mode == "AC" || mode == "IC") {
-      form = mode == "AC" ? WordForm::absolute : WordForm::incremental;
+    if (mode == "AC" || mode == "IC" || sense) {
+      form = mode == "AC"    ? WordForm::absolute
+             : mode == "IC"  ? WordForm::incremental
+             : mode == "DC"  ? WordForm::shortest
+             : mode == "ACP" ? WordForm::upwards
+                             : WordForm::downwards;
       offset = static_cast<std::size_t>(open - value);
     }
   }

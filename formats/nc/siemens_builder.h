@@ -28,6 +28,8 @@ class SiemensBuilder final : public TreeBuilder {
   const char* address(const char* begin, char address, const char* value);
   const char* tool_name(const char* begin, const char* quote);
   const char* call(const char* begin, const char* name_end);
+  const char* flow(const char* begin);
+  const char* modal_call(const char* begin, const char* name_end);
   const char* array(const char* begin, const char* bracket);
   const char* declaration(const char* begin, const char* name_end);
   bool declare(const char*& p);

@@ -19,10 +19,11 @@ bool in_name(char c) { return begins_name(c) || detail::is_digit(c); }
 
 class Reader {
  public:
-  Reader(std::string_view text, const SiemensVariables* values) : text_(text), values_(values) {}
+  Reader(std::string_view text, const SiemensVariables* values, bool condition)
+      : text_(text), values_(values), condition_(condition) {}
 
   Evaluated value() {
-    out_.value = sum();
+    out_.value = whole();
     out_.length = end_;
     if (out_.ok() && values_ != nullptr && !std::isfinite(out_.value)) {
       fail("the result is not a finite number", 0);
@@ -48,6 +49,47 @@ class Reader {
     const std::size_t begin = at_;
     while (at_ < text_.size() && in_name(text_[at_])) ++at_;
     return upper_text(text_.substr(begin, at_ - begin));
+  }
+
+  double whole() { return condition_ ? comparison() : sum(); }
+
+  double comparison() {
+    double left = logic(0);
+    while (out_.ok()) {
+      const char c = peek();
+      const char next = at_ + 1 < text_.size() ? text_[at_ + 1] : '\0';
+      const bool two = (c == '=' && next == '=') || (c == '<' && (next == '=' || next == '>')) ||
+                       (c == '>' && next == '=');
+      if (!two && c != '<' && c != '>') break;
+      at_ += two ? 2 : 1;
+      const double right = logic(0);
+      const bool less = left < right;
+      const bool equal = left == right;
+      left = c == '='                  ? equal
+             : c == '<' && next == '>' ? !equal
+             : c == '<'                ? less || (two && equal)
+                                       : (!less && !equal) || (two && equal);
+    }
+    return left;
+  }
+
+  /// 0: OR, 1: XOR, 2: AND, then sums.
+  double logic(int level) {
+    constexpr std::string_view kNames[] = {"OR", "XOR", "AND"};
+    if (level == 3) return sum();
+    double left = logic(level + 1);
+    while (out_.ok()) {
+      const char c = peek();
+      const std::size_t begin = at_;
+      if (!begins_name(c) || name() != kNames[level]) {
+        at_ = begin;
+        break;
+      }
+      const bool a = left != 0.0;
+      const bool b = logic(level + 1) != 0.0;
+      left = level == 0 ? a || b : level == 1 ? a != b : a && b;
+    }
+    return left;
   }
 
   double sum() {
@@ -99,7 +141,7 @@ class Reader {
     double value = 0.0;
     if (c == '(') {
       ++at_;
-      value = sum();
+      value = whole();
       close(begin);
     } else if (c == '+' || c == '-') {
       ++at_;
@@ -145,6 +187,8 @@ class Reader {
 
   double name_or_call(std::size_t begin) {
     const std::string word = name();
+    if (condition_ && word == "NOT") return operand() == 0.0 ? 1.0 : 0.0;
+    if (condition_ && (word == "TRUE" || word == "FALSE")) return word == "TRUE" ? 1.0 : 0.0;
     if (at_ < text_.size() && text_[at_] == '(') return call(word, begin);
     if (at_ < text_.size() && text_[at_] == '[')
       return fail("an array is not read: " + word, begin);
@@ -196,6 +240,7 @@ class Reader {
 
   std::string_view text_;
   const SiemensVariables* values_;
+  bool condition_;
   std::size_t at_ = 0;
   std::size_t end_ = 0;  ///< behind the last operand
   int depth_ = 0;
@@ -212,7 +257,11 @@ std::optional<double> SiemensVariables::value(const std::string& name) const {
 }
 
 Evaluated evaluate_siemens(std::string_view text, const SiemensVariables* values) {
-  return Reader(text, values).value();
+  return Reader(text, values, false).value();
+}
+
+Evaluated evaluate_siemens_condition(std::string_view text, const SiemensVariables* values) {
+  return Reader(text, values, true).value();
 }
 
 }  // namespace smoothpost::nc

@@ -27,4 +27,8 @@ class SiemensVariables {
 /// @param values  nullptr: only the text is checked, the value has no meaning
 Evaluated evaluate_siemens(std::string_view text, const SiemensVariables* values);
 
+/// The same for a condition: NOT, AND before XOR before OR, and weakest of all == <> < > <= >=, as
+/// the control orders them. True is 1, false 0; any number but 0 is true.
+Evaluated evaluate_siemens_condition(std::string_view text, const SiemensVariables* values);
+
 }  // namespace smoothpost::nc

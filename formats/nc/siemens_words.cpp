@@ -21,7 +21,7 @@ constexpr Keyword kKeywords[] = {
     {"ORIAXES", SiemensWord::oriaxes}, {"TRANS", SiemensWord::trans},
     {"ATRANS", SiemensWord::atrans},   {"ROT", SiemensWord::rot},
     {"AROT", SiemensWord::arot},       {"SUPA", SiemensWord::supa},
-    {"RET", SiemensWord::program_end},
+    {"RET", SiemensWord::program_end}, {"MCALL", SiemensWord::modal_call},
 };
 
 /// Speed, smoothing and buffering: nothing that changes where the programmed points are.
@@ -36,10 +36,9 @@ constexpr std::string_view kNoEffect[] = {
 
 constexpr std::string_view kTolerances[] = {"CTOL", "OTOL", "ATOL", "ADIS", "ADISPOS"};
 
-constexpr std::string_view kFlow[] = {
-    "IF",      "ELSE",   "ENDIF",   "FOR",     "ENDFOR", "WHILE",  "ENDWHILE", "LOOP",
-    "ENDLOOP", "REPEAT", "REPEATB", "UNTIL",   "GOTO",   "GOTOF",  "GOTOB",    "GOTOC",
-    "CASE",    "CALL",   "PCALL",   "EXTCALL", "PROC",   "EXTERN", "MCALL",    "TO"};
+constexpr std::string_view kFlow[] = {"FOR",     "ENDFOR", "LOOP",   "ENDLOOP", "REPEAT",
+                                      "REPEATB", "UNTIL",  "CASE",   "CALL",    "PCALL",
+                                      "EXTCALL", "PROC",   "EXTERN", "TO"};
 
 constexpr std::string_view kSplines[] = {"BSPLINE", "ASPLINE", "CSPLINE", "POLY",      "PO",
                                          "PL",      "SD",      "PW",      "SPLINEPATH"};
@@ -49,8 +48,7 @@ constexpr std::string_view kFrames[] = {
     "CFINE",    "G58",      "G59",      "TCARR",   "TCOFR",  "CYCLE800"};
 constexpr std::string_view kTransformations[] = {"TRANSMIT", "TRACYL",      "TRAANG",    "TRACON",
                                                  "TRAFOON",  "TRAORI_STAT", "TRAORI_DYN"};
-constexpr std::string_view kArcs[] = {"CIP", "CT", "AR", "I1",    "J1",
-                                      "K1",  "AP", "RP", "INVCW", "INVCCW"};
+constexpr std::string_view kArcs[] = {"CT", "AR", "AP", "RP", "INVCW", "INVCCW"};
 
 template <std::size_t N>
 bool contains(const std::string_view (&list)[N], std::string_view name) {
@@ -86,6 +84,7 @@ SiemensWord siemens_call(std::string_view text, std::string_view arguments) {
   if (name == "MSG") return empty ? SiemensWord::no_effect : SiemensWord::message;
   if (name == "CYCLE832") return SiemensWord::cycle832;
   if (name == "CYCLE800") return empty ? SiemensWord::no_swivel : SiemensWord::none;
+  if (name == "CYCLE81" || name == "CYCLE82") return SiemensWord::single_call;
   if (name == "TRAORI") return SiemensWord::traori;
   if (name == "TRAFOOF" && empty) return SiemensWord::trafoof;
   if (name == "SOFTA" || name == "BRISKA" || name == "DRIVEA") return SiemensWord::no_effect;
@@ -102,6 +101,9 @@ char siemens_address(std::string_view text) {
   if (name == "CR") return kCircleRadius;
   if (name == "TURN") return kCircleTurns;
   if (name == "RPL") return kPlaneAngle;
+  if (name == "I1") return kThroughX;
+  if (name == "J1") return kThroughY;
+  if (name == "K1") return kThroughZ;
   return '\0';
 }
 
@@ -118,7 +120,7 @@ std::string siemens_refusal(std::string_view text) {
   };
   constexpr std::string_view kPlain = "let the CAM post write the moves out";
   if (contains(kFlow, name)) {
-    return says("loops, branches, labels and calls are not read in this version", kPlain);
+    return says("counted loops and calls of other programs are not read in this version", kPlain);
   }
   if (contains(kSplines, name)) {
     return says("splines and polynomials are not read in this version",
@@ -133,7 +135,7 @@ std::string siemens_refusal(std::string_view text) {
   }
   if (contains(kArcs, name)) {
     return says("this form of an arc is not read in this version",
-                "let the CAM post write G2 and G3 with I J K or CR=");
+                "let the CAM post write CIP, or G2 and G3 with I J K or CR=");
   }
   if (name.size() == 2 && name[0] >= 'A' && name[0] <= 'C' && detail::is_digit(name[1])) {
     return says("the tool axis is read as A3= B3= C3= or as rotary axes",
@@ -145,7 +147,7 @@ std::string siemens_refusal(std::string_view text) {
   }
   if (name.starts_with("CYCLE") || name.starts_with("POCKET") || name.starts_with("HOLES") ||
       name.starts_with("SLOT") || name == "LONGHOLE") {
-    return says("cycles are not read in this version", kPlain);
+    return says("of the cycles CYCLE81 and CYCLE82 are read", kPlain);
   }
   if (!name.empty() && name[0] == '$') {
     return says("system variables are not read", "let the CAM post write plain numbers");
@@ -168,6 +170,12 @@ std::string address_text(char address) {
       return "TURN";
     case kPlaneAngle:
       return "RPL";
+    case kThroughX:
+      return "I1";
+    case kThroughY:
+      return "J1";
+    case kThroughZ:
+      return "K1";
     default:
       return std::string(1, address);
   }

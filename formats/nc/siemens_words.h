@@ -27,7 +27,9 @@ enum class SiemensWord : std::uint8_t {
   cycle832,     ///< tolerance cycle
   no_swivel,    ///< CYCLE800(): end of the swivelled plane
   declaration,  ///< DEF REAL name, ...
-  program_end   ///< RET
+  program_end,  ///< RET
+  modal_call,   ///< MCALL CYCLE81(..), MCALL
+  single_call   ///< CYCLE81(..), CYCLE82(..)
 };
 
 /// The meaning of a word that stands alone: TRAORI, SOFT, G642 is none of them. Any case.

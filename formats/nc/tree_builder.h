@@ -101,6 +101,13 @@ class TreeBuilder {
     words_in_line_ = words_seen_ = true;
   }
 
+  /// On this line, but for its number.
+  bool words_besides_n() const {
+    return words_in_line_ && program_.pieces.back().letter != 'N' &&
+           !(program_.pieces.back().kind == PieceKind::space && program_.pieces.size() > 1 &&
+             program_.pieces[program_.pieces.size() - 2].letter == 'N');
+  }
+
   Program& program_;
   DiagnosticLog& log_;
   const char* base_;

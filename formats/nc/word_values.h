@@ -43,6 +43,9 @@ class SiemensValues final : public WordValues {
   Evaluated word(std::string_view text, WordForm form) override;
   Evaluated assign(std::string_view text) override;
   void finish_block(bool) override {}
+  Evaluated value(std::string_view text) override {
+    return evaluate_siemens_condition(text, &variables_);
+  }
   bool inch() const override { return modal_.unit != 1.0; }
 
  private:
