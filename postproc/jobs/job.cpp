@@ -668,8 +668,8 @@ ExitStatus status_of(const Diagnostics& diagnostics) {
     const std::string family = d.code.substr(0, d.code.find_first_of("0123456789"));
     if (family == "IN")
       internal = true;
-    else if (family == "US")
-      usage = true;
+    else if (family == "US" || d.where.file.rfind("--", 0) == 0)
+      usage = true;  // --set and the options that stand for one
     else if (family == "NC" || family == "CL" || family == "CSV" || family == "STL" ||
              family == "MF")
       unreadable = true;

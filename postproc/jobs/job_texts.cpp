@@ -75,6 +75,9 @@ std::string summary_text(const Conversion& conversion) {
   if (conversion.blocks > 0)
     text += "; " + std::to_string(conversion.blocks) + " blocks, " +
             fixed_text(conversion.scheduled_time, 1) + " s planned";
+  if (conversion.stream)
+    text += "; joint stream of " + fixed_text(conversion.stream->duration, 1) +
+            (conversion.stream->ok() ? " s (level timed)" : " s failed");
   const auto& unsaid = conversion.not_checked;
   for (std::size_t i = 0; i < unsaid.size(); ++i)
     text += (i == 0 ? "; not checked: " : ", ") + unsaid[i];

@@ -142,6 +142,31 @@ std::string machine_file_of(const std::string& name_or_file, const Options& opti
   return {};
 }
 
+namespace {
+
+/// Faults of an override under the name of the option that the user wrote.
+Diagnostics by_option(Diagnostics problems, const Options& o) {
+  const struct {
+    const char *key, *option;
+    const std::string& value;
+  } all[] = {{"tolerance.tip_mm", "--tip-tolerance", o.tip_tolerance},
+             {"tolerance.axis_deg", "--axis-tolerance", o.axis_tolerance},
+             {"tolerance.lead_deg", "--lead", o.lead},
+             {"tolerance.tilt_deg", "--tilt", o.tilt},
+             {"recipe.smoothing", "--smoothing", o.smoothing},
+             {"recipe.orientation", "--orientation", o.orientation},
+             {"recipe.optimise", "--optimise", o.optimise},
+             {"recipe.schedule", "--schedule", o.schedule},
+             {"dialect.name", "--dialect", o.dialect}};
+  for (Diagnostic& d : problems)
+    for (const auto& each : all)
+      if (!each.value.empty() && d.where.file == std::string("--set ") + each.key)
+        d.where.file = std::string(each.option) + " " + each.value;
+  return problems;
+}
+
+}  // namespace
+
 Result<LoadedMachine> load_machine(const std::string& name_or_file, const Options& options,
                                    const std::vector<MachineOverride>& overrides) {
   const std::string path = machine_file_of(name_or_file, options);
@@ -165,7 +190,8 @@ Result<LoadedMachine> load_machine(const std::string& name_or_file, const Option
   auto bytes = read_file(path, std::size_t{16} << 20);
   if (!bytes.ok()) return Result<LoadedMachine>::failure(bytes.diagnostics());
   auto machine = parse_machine_file(bytes.value(), path, overrides);
-  if (!machine.ok()) return Result<LoadedMachine>::failure(machine.diagnostics());
+  if (!machine.ok())
+    return Result<LoadedMachine>::failure(by_option(machine.diagnostics(), options));
   std::vector<FileHash> files{{path, sha256(bytes.value())}};
   if (const Diagnostics problems = load_body_meshes(machine.value(), files); !problems.empty())
     return Result<LoadedMachine>::failure(problems);

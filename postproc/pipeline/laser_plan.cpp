@@ -76,7 +76,7 @@ class LaserPlanner {
       const bool kept = !orientation_is_free(in_.machine);
       if (!(d.code == "KN153" || d.code == "KN154" || (d.code == "KN151" && kept))) return false;
       d.severity = Severity::warning;
-      d.text += ". This stretch keeps the joints of the programmed path";
+      d.text += ". This stretch keeps the joints of the programmed path, and stops at its corners";
     }
     return true;
   }

@@ -600,7 +600,8 @@ Diagnostic StretchPlanner::no_orientation(const QpFeasibility& why) const {
                                                       : std::string(why.name) + " tolerance";
   return diagnostic(
       "KN151",
-      "no motion of the rotary axes keeps the tool axis inside its tolerance here, at any feed (" +
+      "no smooth motion of the rotary axes keeps the tool axis inside its tolerance here, at any feed "
+      "(" +
           limit + "; short of " + text_of(degrees_from_radians(why.shortfall)) +
           " deg): more --lead and --tilt, a larger gap to tool.min_gap_mm, or smaller "
           "recipe.knot_every",

@@ -183,11 +183,16 @@ Diagnostic too_fast_problem(const std::vector<TooFast>& too_fast, const MachineD
     text += std::string(count > 1 ? "; " : "") + "line " + std::to_string(t.line) + ": axis " +
             machine.axes[static_cast<std::size_t>(t.load.joint)].name + " needs " +
             four_digits(t.load.factor) + " times its " + word(t.load.kind);
+    const double order = t.load.kind == FeedOverload::Kind::jerk           ? 3.0
+                         : t.load.kind == FeedOverload::Kind::acceleration ? 2.0
+                                                                           : 1.0;
+    if (order > 1.0)
+      text += " (a feed " + four_digits(std::pow(t.load.factor, 1.0 / order)) + " times lower)";
   }
   if (count > kMostTold) text += "; and " + std::to_string(count - kMostTold) + " more lines";
   return diagnostic("KN152",
                     "the programmed feed cannot be kept (limits times tolerance.limit_share): " +
-                        text + ". recipe.schedule = \"jerk\" slows down where it has to",
+                        text + ". --schedule jerk (recipe.schedule) slows down where it has to, and only there",
                     file_name, static_cast<int>(too_fast.front().line));
 }
 

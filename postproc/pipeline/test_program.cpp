@@ -98,10 +98,12 @@ class TestBuilder {
 
   double first_time(JointMask joints) const {
     double time = 0.0;
-    for (int j = 0; j < machine_.size(); ++j)
-      if (joints >> j & 1U)
-        time = std::max(time, (axis(j).joint.upper - axis(j).joint.lower) /
-                                  (4.0 * (is_rotary(j) ? kRotarySpeed : kLinearSpeed)));
+    for (int j = 0; j < machine_.size(); ++j) {
+      if (!(joints >> j & 1U)) continue;
+      const double range = axis(j).joint.upper - axis(j).joint.lower;
+      const double way = is_rotary(j) ? std::min(range, 2.0 * kPi) : range;
+      time = std::max(time, way / (4.0 * (is_rotary(j) ? kRotarySpeed : kLinearSpeed)));
+    }
     return time;
   }
 

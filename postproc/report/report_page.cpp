@@ -150,7 +150,7 @@ ReportPage report_page(const PageInput& in, const SceneSettings& settings) {
   const std::vector<Section> sections = {
       {"checks", "Checks", checks_html(in)},
       {"unchecked", "Not checked", unchecked_html(in)},
-      {"messages", "Warnings",
+      {"messages", "Messages",
        messages_html(in, false) + (notes.empty() ? "" : "<h3>Notes</h3>\n" + notes)},
       {"machine", "Machine and time", machine_html(in)},
       {"feed", "What slows the feed", figures(page.plots, "feed") + slowed_html(in)},

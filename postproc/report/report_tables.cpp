@@ -142,6 +142,20 @@ std::string used(const std::optional<double>& value, double limit) {
          (limit > 0.0 ? " (" + short_number(100.0 * *value / limit, 2) + " %)" : "");
 }
 
+/// The first error of what is not certified, for people who read no further.
+std::string reason_html(const Conversion& c) {
+  if (c.verdict != Verdict::refused && c.verdict != Verdict::forced) return {};
+  const auto errors = count_of(c.diagnostics, Severity::error);
+  for (const Diagnostic& d : c.diagnostics) {
+    if (d.severity != Severity::error) continue;
+    return "<p><b>Why:</b> " + escape_html(to_string(d)) +
+           (errors > 1 ? " <a href=\"#messages\">and " + std::to_string(errors - 1) + " more</a>"
+                       : std::string()) +
+           "</p>\n";
+  }
+  return {};
+}
+
 }  // namespace
 
 std::string verdict_html(const PageInput& in) {
@@ -150,9 +164,12 @@ std::string verdict_html(const PageInput& in) {
   const auto failed = static_cast<std::size_t>(
       std::count_if(c.checks.begin(), c.checks.end(), [](const Check& k) { return !k.ok; }));
   std::string out = std::string("<div class=\"verdict ") + words.kind + "\"><strong>" +
-                    words.title + "</strong><p>" + words.text + "</p>\n<dl class=\"figures\">\n";
+                    words.title + "</strong><p>" + words.text + "</p>\n" + reason_html(c) +
+                    "<dl class=\"figures\">\n";
   out += figure("Checks", std::to_string(c.checks.size()),
-                failed > 0 ? std::to_string(failed) + " failed" : "none failed");
+                c.checks.empty() ? "none could be made"
+                : failed > 0     ? std::to_string(failed) + " failed"
+                                 : "none failed");
   for (const Check& k : c.checks)
     if (k.name == "tip_deviation")
       out += figure("Tool tip leaves the path by", short_number(k.value) + " " + k.unit,
@@ -161,6 +178,8 @@ std::string verdict_html(const PageInput& in) {
     out += figure(
         "Time, planned", seconds(c.scheduled_time),
         c.programmed_time > 0.0 ? "feeds alone, as programmed: " + seconds(c.programmed_time) : "");
+    if (c.executed.seconds)
+      out += figure("Time on the control, estimated", seconds(*c.executed.seconds));
     out += figure("Motion blocks", std::to_string(c.blocks));
   }
   out += figure("Not checked", std::to_string(c.not_checked.size()));
