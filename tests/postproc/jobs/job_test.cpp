@@ -75,7 +75,12 @@ TEST_CASE("run_job: exit statuses by the table", "[postproc][jobs]") {
   CHECK(status(run_job(o, {})) == 2);
   o = mill();
   o.set = {"tolerance.tip_mm=-1"};
-  CHECK(status(run_job(o, {})) == 4);
+  CHECK(status(run_job(o, {})) == 2);
+  o = mill();
+  o.schedule = "programed";
+  const JobResult typo = run_job(o, {});
+  CHECK(status(typo) == 2);
+  CHECK(typo.diagnostics.front().where.file == "--schedule programed");
 }
 
 TEST_CASE("run_job: an inch part, a wrong zero, a mirrored and a foreign part are refused by name",
