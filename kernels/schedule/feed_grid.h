@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 #include "kernels/schedule/feed_path.h"
@@ -44,6 +45,8 @@ struct FeedStretch {
   FeedLanes lanes;
   double from = 0.0, to = 0.0;
   RestMap map;
+  const std::function<bool()>* going = nullptr;  ///< asked by every iteration, on any thread;
+                                                 ///< false: what is reached counts
 };
 
 /// Derivatives by w at one place: lane l at [l], [width + l], [2·width + l].

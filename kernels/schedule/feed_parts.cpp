@@ -45,6 +45,7 @@ void cut(const FeedProgram& whole, std::size_t first, std::size_t end, PartProgr
   part.grid.basis = cubic_basis(part.grid.elements);
   part.program.grid = &part.grid;
   part.program.lanes = whole.lanes;
+  part.program.going = whole.going;
   part.program.factors = slice(whole.factors, first * nodes, end * nodes);
 }
 

@@ -257,6 +257,7 @@ class FeedIteration {
           n > 0 && std::abs(objective_ - before) < 0.03 * settings.tolerance * objective_;
       solution.converged = near && (residual() < 1e-3 || rests);
       if (solution.converged || n >= settings.iterations) break;
+      if (program_.going && !(*program_.going)()) break;
       before = objective_;
       Step step;
       step.centre = std::max(share * gap_ / rows, 0.2 * settings.tolerance * objective_ / rows);

@@ -23,6 +23,7 @@ struct FeedProgram {
   std::vector<Factors> factors;  ///< one a point
   int fixed_first = 0;           ///< that many first controls stay as they start
   int fixed_last = 0;
+  const std::function<bool()>* going = nullptr;  ///< FeedStretch::going
 };
 
 struct FeedSolverSettings {

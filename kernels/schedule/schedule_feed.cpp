@@ -1,7 +1,10 @@
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <thread>
 
 #include "kernels/core/contract.h"
 #include "kernels/schedule/feed_law.h"
@@ -51,10 +54,19 @@ class Schedule {
     end_ = end;
     at_ = path_.breaks.front();
     windowed_ = needs_windows();
+    // Iterations ask on all threads; only the caller's hears progress.
+    going_ = [this, &progress, caller = std::this_thread::get_id()] {
+      if (!cancelled_ && std::this_thread::get_id() == caller &&
+          !progress("feed schedule", share_done()))
+        cancelled_ = true;
+      return !cancelled_;
+    };
     bool going = progress("feed schedule", 0.0) && plan_first();
     while (going && plan_ && plan_->stretch.to < path_.breaks.back())
-      going = progress("feed schedule", share_done()) && advance();
-    if (!going && result_.status == FeedStatus::solved) result_.status = FeedStatus::cancelled;
+      going = !cancelled_ && progress("feed schedule", share_done()) && advance();
+    going = going && !cancelled_;
+    if (cancelled_ || (!going && result_.status == FeedStatus::solved))
+      result_.status = FeedStatus::cancelled;
     if (!going || !plan_) return refused();
     commit(plan_->law.grid.elements.size());
     result_.profile = FeedProfile(std::make_shared<const FeedLaw>(std::move(whole_)));
@@ -119,6 +131,7 @@ class Schedule {
     Plan plan;
     plan.stretch = {&path_, lanes_, s, window_end(s), {}};
     FeedStretch& stretch = plan.stretch;
+    stretch.going = &going_;
     const bool last = stretch.to >= path_.breaks.back();
     const FeedEnd goal = last ? end_ : FeedEnd{};
     stretch.map = RestMap(stretch.to - s, grading(path_, limits_, survey_, {s, stretch.to}),
@@ -230,6 +243,8 @@ class Schedule {
   FeedEnd state_, end_;
   double at_ = 0.0;  ///< the start of the plan
   bool windowed_ = false;
+  std::function<bool()> going_;
+  std::atomic<bool> cancelled_ = false;
   std::optional<Plan> plan_;
   FeedLaw whole_;
   FeedResult result_;

@@ -93,6 +93,7 @@ FeedProgram make_program(const FeedStretch& stretch, const FeedGrid& grid,
   FeedProgram program;
   program.grid = &grid;
   program.lanes = &stretch.lanes;
+  program.going = stretch.going;
   program.factors.reserve(grid.points());
   for (const FeedElement& element : grid.elements)
     for (double node : grid.rule.nodes) {

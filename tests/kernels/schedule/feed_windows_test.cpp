@@ -20,13 +20,18 @@ struct WindowRun {
   int failed = 0;
 };
 
-/// Progress is told once at the start, once before each later part, once at the end.
+/// Progress is told with a share of its own for each part, 0 for the first, and at the end.
 WindowRun run_in_windows(const test::LimitedPath& given) {
   int told = 0;
-  const Progress progress{[&](const char*, double) { return ++told > 0; }};
+  double last = -1.0;
+  const Progress progress{[&](const char*, double share) {
+    told += share != last ? 1 : 0;
+    last = share;
+    return true;
+  }};
   WindowRun run;
   run.result = schedule_feed(given.path, given.limits, {}, {}, in_windows(), progress);
-  run.failed = run.result.windows - (told - 1);
+  run.failed = run.result.windows - told;
   return run;
 }
 
