@@ -23,10 +23,10 @@ namespace smoothpost::nc {
 ///
 /// One object runs one program. What a block does in which order stands in executor.cpp, motion in
 /// execute_motion.cpp, cycles in execute_cycles.cpp, splines in execute_splines.cpp, offsets in
-/// execute_offsets.cpp, tools in execute_tools.cpp, process
-/// words and comments in execute_process.cpp, loops and branches in execute_flow.cpp, calls in
-/// execute_calls.cpp, saved modal state in execute_saved_state.cpp, what only other controls have
-/// in execute_dialects.cpp and execute_siemens.cpp.
+/// execute_offsets.cpp, tools in execute_tools.cpp, process words and comments in
+/// execute_process.cpp, loops and branches in execute_flow.cpp, calls in execute_calls.cpp, saved
+/// modal state in execute_saved_state.cpp, what only other controls have in execute_dialects.cpp
+/// and execute_siemens.cpp.
 class Executor {
  public:
   Executor(const Program& program, const InterpreterSettings& settings, const EventMatcher& matcher,

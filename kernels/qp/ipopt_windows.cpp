@@ -140,7 +140,7 @@ QpSolution solve_by_windows(const QuadraticProgram& qp, const QpSettings& settin
   QpSettings sharp = settings;
   sharp.tolerance *= kSharper;
   const int controls = qp.layout.controls();
-  const int count = std::max(1, controls / windows.controls);
+  const int count = (controls + windows.controls - 1) / windows.controls;
   QpSolution out;
   out.windows = count;
   std::string told;
@@ -164,12 +164,10 @@ QpSolution solve_by_windows(const QuadraticProgram& qp, const QpSettings& settin
     out.iterations += answer.iterations;
     if (!answer.point || answer.status == QpStatus::infeasible ||
         answer.status == QpStatus::failed) {
-      if (told.empty()) {
-        out.status = answer.status;
-        told = "window " + std::to_string(k + 1) + " of " + std::to_string(count) +
-               ": Ipopt: " + answer.word;
-      }
-      continue;
+      out.status = answer.status;
+      told = "window " + std::to_string(k + 1) + " of " + std::to_string(count) +
+             ": Ipopt: " + answer.word;
+      break;
     }
     // Around where its own part starts it takes over from the window before, bit by bit: rigid ends
     // bend the multipliers beside them.

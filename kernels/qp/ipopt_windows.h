@@ -7,7 +7,7 @@ namespace smoothpost {
 
 /// How a programme is cut into windows, in control points of one channel.
 struct QpWindows {
-  int controls = 0;  ///< of a window, without what it has in common with its neighbours
+  int controls = 0;  ///< most of a window, without what it has in common with its neighbours
   int overlap = 0;   ///< on each side
 };
 

@@ -65,7 +65,8 @@ Result<std::vector<StreamRow>> read_joint_stream(const std::string& text,
 ///    file's limit and what half a digit d of every row may add to it: 2d/T, 4d/T², 8d/T³. A path
 ///    that keeps a limit has such a difference within it, because it is a mean of the derivative;
 ///  - position_limit.<axis> and the beam rules (verify_machine), deviations, path_complete and the
-///    beam's places (verify_deviation), with straight joint motion from row to row; clearance.
+///    beam's places (verify_deviation), with straight joint motion from row to row, each row paired
+///    with the place of the input that it is nearest to, in order; clearance.
 ///
 /// A stream that fails a check is not to be written. Failures: IN111 as read_joint_stream; KN162 no
 /// row, or more than kMostStreamRows. Guarantee (tests): a row that is changed, missing, doubled or

@@ -33,6 +33,8 @@ TEST_CASE("test_program: slow and with the tip held on every shipped machine",
       CHECK(c.ok);
     }
     for (const auto& move : read.value().moves) CHECK_FALSE(move.beam);
+    // Nobody stands an hour beside a rotary that goes home a few degrees, whatever its range.
+    for (const auto& move : test.value().program.moves) CHECK(move.duration <= 300.0);
   }
 }
 
