@@ -17,9 +17,9 @@ struct QpWindows {
 /// derivatives) outside the window held at what the windows before have made of `start`: the
 /// bidiagonal equations at its ends are what it takes over from its neighbours. One sweep. The
 /// solution is put together from all windows, multipliers too, each taking over from the one before
-/// along what they have in common; its certificate is one of the whole programme. Windows are solved
-/// to a thousandth of the tolerance, so that they fit.
-/// `windows` of the result is their number, `iterations` the sum.
+/// along what they have in common; its certificate is one of the whole programme. Windows are
+/// solved to a thousandth of the tolerance, so that they fit. `windows` of the result is their
+/// number, `iterations` the sum.
 /// @pre no relaxation; windows.controls ≥ 16
 /// @return status optimal with certificate.kkt() ≤ 100·tolerance; else that of the first window
 /// that failed, or iteration_limit where the windows do not fit
