@@ -237,6 +237,14 @@ std::vector<FeedLoad> element_loads(const FeedStretch& stretch, const FeedGrid& 
   return loads;
 }
 
+void renew_loads(const FeedStretch& stretch, const FeedGrid& grid,
+                 const std::vector<double>& controls, const std::vector<bool>& changed,
+                 std::vector<FeedLoad>& loads) {
+  const ElementPlaces places(stretch, grid, controls);
+  for (std::size_t e = 0; e < loads.size(); ++e)
+    if (changed[e]) loads[e] = places.largest(e);
+}
+
 std::vector<FeedBinding> feed_bindings(const FeedStretch& stretch, const FeedGrid& grid,
                                        const std::vector<double>& controls, std::size_t elements) {
   const ElementPlaces places(stretch, grid, controls);

@@ -19,6 +19,11 @@ namespace smoothpost {
 std::vector<FeedLoad> element_loads(const FeedStretch& stretch, const FeedGrid& grid,
                                     const std::vector<double>& controls);
 
+/// The same anew for the elements that `changed` names only.
+void renew_loads(const FeedStretch& stretch, const FeedGrid& grid,
+                 const std::vector<double>& controls, const std::vector<bool>& changed,
+                 std::vector<FeedLoad>& loads);
+
 /// The stretches on the first `elements` elements on which a load is ≥ 0.99, at the same places;
 /// ascending in `from`.
 std::vector<FeedBinding> feed_bindings(const FeedStretch& stretch, const FeedGrid& grid,

@@ -18,6 +18,12 @@ constexpr std::size_t kBlend = 12;       // controls over which laws change
 constexpr std::size_t kEndControls = 8;  // of a part, that are not trusted
 constexpr double kApart = 1e-4;          // relative
 constexpr double kEndShare = 0.5;        // of the largest constant b, at the ends of a part
+constexpr std::size_t kReach = 24;       // elements that are mended with one
+constexpr std::size_t kWiden = 4;        // times, where that is not enough
+constexpr int kHeld = 3;                 // controls that join what is mended to the rest
+constexpr std::size_t kEased = 4;        // elements beside them
+constexpr double kEase = 1.0004;         // by which their rows are let out
+constexpr double kStartBelow = 1.01;     // what is mended starts slower by that than it has to be
 
 /// A programme of its own for elements first .. end of another.
 struct PartProgram {
@@ -49,8 +55,7 @@ void cut(const FeedProgram& whole, std::size_t first, std::size_t end, PartProgr
   part.program.factors = slice(whole.factors, first * nodes, end * nodes);
 }
 
-void solve_part(const FeedProgram& whole, double c, const FeedPartsSettings& settings,
-                FeedPart& part) {
+void solve_part(const FeedProgram& whole, const FeedPartsSettings& settings, FeedPart& part) {
   const bool alone = part.first == 0 && part.end == whole.grid->elements.size();
   PartProgram own;
   const FeedProgram* program = &whole;
@@ -68,16 +73,14 @@ void solve_part(const FeedProgram& whole, double c, const FeedPartsSettings& set
   };
   if (!from_start) own.program.fixed_first = 2;
   if (!to_end) own.program.fixed_last = 2;
-  const bool fresh = part.controls.empty();
-  std::vector<double> start = std::move(part.controls);
-  for (double& b : start) b /= c * c;
-  if (fresh) start.assign(static_cast<std::size_t>(program->grid->controls()), slow);
-  FeedSolution solution = solve_feed(*program, hold_ends(std::move(start)), settings.solver);
+  FeedSolution solution = solve_feed(
+      *program, hold_ends(local_law(*program, from_start ? 0.0 : slow, to_end ? 0.0 : slow)),
+      settings.solver);
   part.iterations = solution.iterations;
   if (!solution.converged && settings.retry) {
-    FeedSolution again = solve_feed(
-        *program, hold_ends(local_law(*program, from_start ? 0.0 : slow, to_end ? 0.0 : slow)),
-        settings.solver);
+    const auto controls = static_cast<std::size_t>(program->grid->controls());
+    FeedSolution again =
+        solve_feed(*program, hold_ends(std::vector<double>(controls, slow)), settings.solver);
     part.iterations += again.iterations;
     if (again.converged || (again.feasible && again.time < solution.time))
       solution = std::move(again);
@@ -86,10 +89,10 @@ void solve_part(const FeedProgram& whole, double c, const FeedPartsSettings& set
   part.converged = solution.converged;
 }
 
-void solve_all(const FeedProgram& program, const std::vector<bool>& wanted, double c,
+void solve_all(const FeedProgram& program, const std::vector<bool>& wanted,
                const FeedPartsSettings& settings, std::vector<FeedPart>& parts) {
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t k) {
-    if (wanted[k]) solve_part(program, c, settings, parts[k]);
+    if (wanted[k]) solve_part(program, settings, parts[k]);
   });
 }
 
@@ -177,12 +180,94 @@ void put_together(const FeedProgram& program, FeedParts& all) {
   solution.time = law_time(*program.grid, solution.controls);
 }
 
-void finish(const FeedProgram& program, double c, const FeedPartsSettings& settings,
-            FeedParts& all) {
-  std::vector<bool> wanted;
-  while (settings.join && join_parts(all.parts, wanted))
-    solve_all(program, wanted, c, settings, all.parts);
-  put_together(program, all);
+/// Elements first .. end that are mended as one, `reach` of them on each side for the others' sake.
+struct Run {
+  std::size_t first = 0, end = 0, reach = kReach;
+};
+
+Run widened(const Run& run, std::size_t by, std::size_t count) {
+  Run wide = run;
+  wide.first = run.first > by + kEased ? run.first - by : 0;
+  wide.end = run.end + by + kEased < count ? run.end + by : count;
+  return wide;
+}
+
+/// Those that touch become one.
+std::vector<Run> joined(const std::vector<Run>& runs) {
+  std::vector<Run> out;
+  for (const Run& run : runs) {
+    if (out.empty() || run.first > out.back().end) {
+      out.push_back(run);
+      continue;
+    }
+    out.back().end = std::max(out.back().end, run.end);
+    out.back().reach = std::max(out.back().reach, run.reach);
+  }
+  return out;
+}
+
+std::vector<Run> runs_to_mend(const FeedMending& mending) {
+  std::vector<Run> runs;
+  const std::size_t count = mending.over.size();
+  for (std::size_t e = 0; e < count; ++e)
+    if (mending.over[e] > mending.most) runs.push_back(widened({e, e + 1}, kReach, count));
+  return joined(runs);
+}
+
+/// The law of a run, slower where it is too fast and the same at the controls that are held.
+std::vector<double> slower(const std::vector<double>& law, double c, std::size_t reach,
+                           bool held_first, bool held_last) {
+  std::vector<double> out = law;
+  const std::size_t n = law.size();
+  const auto ramp = [reach](std::size_t from_end) {
+    const double t = std::clamp(
+        (static_cast<double>(from_end) - (kHeld - 1.0)) / static_cast<double>(reach), 0.0, 1.0);
+    return t * t * (3.0 - 2.0 * t);
+  };
+  for (std::size_t j = 0; j < n; ++j) {
+    const double share = std::min(held_first ? ramp(j) : 1.0, held_last ? ramp(n - 1 - j) : 1.0);
+    out[j] /= std::pow(c, 2.0 * share);
+  }
+  return out;
+}
+
+/// False: no law was found; else `controls` of the whole are changed.
+bool mend_run(const FeedProgram& whole, const FeedMending& mending, const Run& run,
+              std::vector<double>& controls, int& iterations) {
+  const auto at = [](std::size_t k) { return static_cast<std::ptrdiff_t>(k); };
+  PartProgram own;
+  cut(whole, run.first, run.end, own);
+  // The controls of the whole, not those of a clamped spline of its own.
+  own.grid.basis.assign(whole.grid->basis.begin() + at(run.first),
+                        whole.grid->basis.begin() + at(run.end));
+  const bool held_first = run.first > 0, held_last = run.end < whole.grid->elements.size();
+  const std::size_t nodes = own.grid.rule.nodes.size(), elements = run.end - run.first;
+  const auto ease = [&](std::size_t e) {
+    for (std::size_t i = e * nodes; i < (e + 1) * nodes; ++i) {
+      FeedProgram::Factors& f = own.program.factors[i];
+      f = {f.velocity / kEase, f.acceleration / kEase, f.jerk / kEase};
+    }
+  };
+  for (std::size_t e = 0; e < kEased; ++e) {
+    if (held_first) ease(e);
+    if (held_last) ease(elements - 1 - e);
+  }
+  if (held_first) own.program.fixed_first = kHeld;
+  if (held_last) own.program.fixed_last = kHeld;
+  const double most =
+      *std::max_element(mending.over.begin() + at(run.first), mending.over.begin() + at(run.end));
+  const std::vector<double> law(controls.begin() + at(run.first),
+                                controls.begin() + at(run.end) + 3);
+  const FeedSolution solution =
+      solve_feed(own.program, slower(law, kStartBelow * most, run.reach, held_first, held_last),
+                 mending.solver);
+  iterations = solution.iterations;
+  if (!solution.converged) return false;
+  // Runs side by side share controls that both hold.
+  const std::size_t from = held_first ? kHeld : 0, to = law.size() - (held_last ? kHeld : 0);
+  std::copy(solution.controls.begin() + at(from), solution.controls.begin() + at(to),
+            controls.begin() + at(run.first + from));
+  return true;
 }
 
 }  // namespace
@@ -198,22 +283,45 @@ FeedParts solve_in_parts(const FeedProgram& program, const FeedPartsSettings& se
     all.parts[k].first = k == 0 ? 0 : first - kOverlap;
     all.parts[k].end = k + 1 == parts ? count : end + kOverlap;
   }
-  solve_all(program, std::vector<bool>(parts, true), 1.0, settings, all.parts);
-  finish(program, 1.0, settings, all);
+  std::vector<bool> wanted(parts, true);
+  solve_all(program, wanted, settings, all.parts);
+  while (settings.join && join_parts(all.parts, wanted))
+    solve_all(program, wanted, settings, all.parts);
+  put_together(program, all);
   return all;
 }
 
-void solve_again(const FeedProgram& program, const std::vector<bool>& changed, double c,
-                 const FeedPartsSettings& settings, FeedParts& all) {
-  std::vector<bool> wanted;
-  for (const FeedPart& part : all.parts)
-    wanted.push_back(std::find(changed.begin() + static_cast<std::ptrdiff_t>(part.first),
-                               changed.begin() + static_cast<std::ptrdiff_t>(part.end),
-                               true) != changed.begin() + static_cast<std::ptrdiff_t>(part.end));
-  for (std::size_t k = 0; k < wanted.size(); ++k)
-    if (!wanted[k]) all.parts[k].iterations = 0;
-  solve_all(program, wanted, c, settings, all.parts);
-  finish(program, c, settings, all);
+std::vector<bool> mend_law(const FeedProgram& program, const FeedMending& mending,
+                           FeedSolution& solution) {
+  const std::size_t count = program.grid->elements.size();
+  require(program.fixed_first == 0 && program.fixed_last == 0 && mending.over.size() == count &&
+              solution.controls.size() == static_cast<std::size_t>(program.grid->controls()),
+          "mend_law: a law of this grid, from rest to rest");
+  std::vector<bool> changed(count, false);
+  double weighted = 0.0;
+  for (std::vector<Run> runs = runs_to_mend(mending); !runs.empty();) {
+    std::vector<int> iterations(runs.size(), 0);
+    std::vector<char> mended(runs.size(), 0);
+    tbb::parallel_for(std::size_t{0}, runs.size(), [&](std::size_t k) {
+      mended[k] = mend_run(program, mending, runs[k], solution.controls, iterations[k]);
+    });
+    std::vector<Run> wider;
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+      const Run& run = runs[k];
+      weighted += iterations[k] * static_cast<double>(run.end - run.first);
+      if (mended[k]) {
+        std::fill(changed.begin() + static_cast<std::ptrdiff_t>(run.first),
+                  changed.begin() + static_cast<std::ptrdiff_t>(run.end), true);
+      } else if (run.first > 0 || run.end < count) {
+        wider.push_back(widened(run, (kWiden - 1) * run.reach, count));
+        wider.back().reach *= kWiden;
+      }
+    }
+    runs = joined(wider);
+  }
+  solution.iterations = static_cast<int>(std::lround(weighted / static_cast<double>(count)));
+  solution.time = law_time(*program.grid, solution.controls);
+  return changed;
 }
 
 }  // namespace smoothpost

@@ -12,7 +12,7 @@ struct FeedPartsSettings {
   FeedSolverSettings solver;
   bool join = true;   ///< solve parts that do not meet as one; false: change over where they are
                       ///< nearest
-  bool retry = true;  ///< a part that does not converge once more, from its local_law()
+  bool retry = true;  ///< a part that does not converge once more, from a constant law
 };
 
 /// A run of elements that was solved by itself.
@@ -30,7 +30,7 @@ struct FeedParts {
                                 ///< with their points
 };
 
-/// Solves a programme from rest to rest from half of its largest constant, in parts of about 600
+/// Solves a programme from rest to rest from its local_law(), in parts of about 600
 /// elements that share 200 with each neighbour. A part starts and ends slowly where the path goes
 /// on: two controls there are half of the largest b that is possible as a constant on it, so it
 /// always has a law. Behind the next bottleneck such a law is that of the whole: between two parts
@@ -44,8 +44,23 @@ struct FeedParts {
 /// @pre no fixed controls   @throws ContractViolation   Not from a paper.
 FeedParts solve_in_parts(const FeedProgram& program, const FeedPartsSettings& settings);
 
-/// Solves those parts again on which a row has changed, from their laws shrunk by `c` in time.
-void solve_again(const FeedProgram& program, const std::vector<bool>& changed, double c,
-                 const FeedPartsSettings& settings, FeedParts& parts);
+/// Where a law is to be mended: elements whose limits were drawn in.
+struct FeedMending {
+  std::vector<double> over;  ///< of an element: the factor of all times that it wants by itself
+  double most = 1.0;         ///< elements with more than that are mended
+  FeedSolverSettings solver;
+};
+
+/// Solves the elements that want more than `most` again, with 24 on each side of them, in place:
+/// everything else stays. Three controls beside each such run hold b, b' and b''; rows of the four
+/// elements next to them are let out by 0.04 %, for the law that is held there uses them up. Where
+/// that has no law (in the middle of a way at full acceleration the speed at the end of a slower
+/// start cannot be had), 96, 384 .. elements on each side, at last all of them; where they have
+/// none, the law stays. Returns the elements whose law may have changed. `solution.time` and
+/// iterations are brought up to date.   Deterministic on any number of threads (TBB).   Cost:
+/// solve_feed()'s of the runs.
+/// @pre as solve_in_parts(); `solution` is of this grid   @throws ContractViolation
+std::vector<bool> mend_law(const FeedProgram& program, const FeedMending& mending,
+                           FeedSolution& solution);
 
 }  // namespace smoothpost

@@ -71,8 +71,8 @@ class FeedProfile {
 struct FeedSettings {
   double element_time = 0.007;  ///< s of motion per spline element of the last grid
   int least_elements = 40;
-  bool tighten = true;         ///< up to three more solves with the rows drawn in where they
-                               ///< overshoot (from a given speed up to two)
+  bool tighten = true;         ///< the law is mended up to six times where it overshoots (from a
+                               ///< given speed: solved again up to two times)
   double margin = 3e-5;        ///< relative, by which the last dilation goes beyond the check
   double smooth_share = 1e-4;  ///< relative jump of q', q'' at a break that counts as smooth
   std::size_t window_points = 600000;  ///< above this many collocation points: windows
@@ -105,7 +105,7 @@ struct FeedResult {
 /// and feed, rate and turn rate cap b. The rest at an end lies in φ ~ w³ and holds for any b.
 /// One interior point (solve_feed, in overlapping parts: solve_in_parts) on a coarse grid, then on
 /// one that is even in time and finer where the path's own jerk goes up and down; elements that
-/// overshoot are drawn in, up to three times; at last all times are stretched by the least factor
+/// overshoot are drawn in, up to six times; at last all times are stretched by the least factor
 /// that brings 44 places an element below every limit, times 1 + margin. Above `window_points`:
 /// windows of 8 look-aheads. Each starts from a state of the one before, ends at rest (so there is
 /// always a stop), and has limits that sink by 0.3 % to its end; it is kept up to a look-ahead

@@ -18,6 +18,7 @@ namespace {
 constexpr double kInside = 1e-4;      // share by which limits are lowered where nothing is dilated
 constexpr double kSlope = 0.003;      // by which they sink along a window
 constexpr int kMovingPoints = 13;     // an element, where nothing is dilated
+constexpr int kTightenings = 6;       // from rest to rest
 constexpr int kMovingGrids = 3;       // each of half the elements' size, from a moving start
 constexpr double kWindowShare = 8.0;  // look-aheads of a window, at the speed of the survey
 
@@ -112,7 +113,7 @@ class Schedule {
     StretchSettings result;
     result.element_time = settings_.element_time;
     result.least_elements = settings_.least_elements;
-    result.tightenings = settings_.tighten ? (moving ? 2 : 3) : 0;
+    result.tightenings = settings_.tighten ? (moving ? 2 : kTightenings) : 0;
     if (moving) {
       result.points = kMovingPoints;
       result.lower = kInside;

@@ -16,11 +16,12 @@ constexpr double kFirstShare = 0.5;  // of the largest constant b, at the start
 constexpr double kCoarseGap = 1e-3, kFineGap = 1e-4, kLastGap = 1e-5;  // of solves, relative to T
 constexpr double kMostFiner = 40.0;     // fine elements a coarse one, in the mean
 constexpr double kTightEnough = 1.001;  // dilation after which nothing is drawn in again
-constexpr double kMostMore = 4.0;       // elements, for the jerk's variation in one
-constexpr double kTimeShare = 0.85;     // of the measure of the fine grid; the rest is w
-constexpr double kNearLimit = 0.9999;   // loads above it are drawn in
+constexpr double kMended =
+    1.0005;  // of an element, above which it is; more than mend_law() lets out
+constexpr double kMostMore = 4.0;      // elements, for the jerk's variation in one
+constexpr double kTimeShare = 0.85;    // of the measure of the fine grid; the rest is w
+constexpr double kNearLimit = 0.9999;  // loads above it are drawn in
 constexpr double kDrawIn = 1.00005;
-constexpr double kInside = 1.002;
 constexpr double kMostChange = 0.4;   // of b between the first two controls of a moving end
 constexpr double kBlendShare = 0.15;  // of the extent: how far an end's value reaches at first
 
@@ -105,22 +106,20 @@ FeedProgram make_program(const FeedStretch& stretch, const FeedGrid& grid,
   return program;
 }
 
-/// Draws the rows of an element in by what its loads are beyond the lowered limits; which ones.
-std::vector<bool> draw_in(FeedProgram& program, const std::vector<FeedLoad>& loads) {
+/// Draws the rows of elements in by what their loads are beyond the lowered limits.
+void draw_in(FeedProgram& program, const std::vector<FeedLoad>& loads, double most) {
   const std::size_t nodes = program.grid->rule.nodes.size();
-  std::vector<bool> changed(loads.size(), false);
   const auto more = [](double& factor, double load) {
     if (load > kNearLimit) factor *= kDrawIn * load;
   };
   for (std::size_t e = 0; e < loads.size(); ++e) {
-    changed[e] = loads[e].largest() > kNearLimit;
+    if (dilation_of(loads[e]) <= most) continue;
     for (std::size_t i = e * nodes; i < (e + 1) * nodes; ++i) {
       more(program.factors[i].velocity, loads[e].velocity);
       more(program.factors[i].acceleration, loads[e].acceleration);
       more(program.factors[i].jerk, loads[e].jerk);
     }
   }
-  return changed;
 }
 
 std::vector<double> scaled(std::vector<double> values, double factor) {
@@ -222,34 +221,25 @@ std::vector<FeedElement> fine_elements(const FeedStretch& stretch, const Stretch
   return feed_elements(stretch, measure, static_cast<int>(std::lround(measure.value.back())));
 }
 
-void take(const FeedStretch& stretch, const FeedSolution& solution, StretchLaw& law) {
-  law.iterations += solution.iterations;
-  law.controls = solution.controls;
-  law.time = solution.time;
-  law.converged = solution.converged;
-  law.loads = element_loads(stretch, law.grid, law.controls);
-}
-
-/// Draws rows in where the law overshoots and solves again, a few times; keeps the best.
+/// Draws rows in where the law overshoots and mends it there, a few times; keeps the best.
 void tighten(const FeedStretch& stretch, const StretchSettings& settings, FeedProgram& program,
-             FeedParts& parts, StretchLaw& law) {
-  FeedSolution best = parts.solution;
-  std::vector<FeedLoad> best_loads = law.loads;
-  double certified = law.time * law.dilation();
-  for (int n = 0; n < settings.tightenings; ++n) {
-    if (law.dilation() <= (n == 0 ? kDrawIn : kTightEnough)) break;
-    const std::vector<bool> changed = draw_in(program, law.loads);
-    solve_again(program, changed, kInside * law.dilation(), {{kLastGap}, true, false}, parts);
-    take(stretch, parts.solution, law);
-    if (law.time * law.dilation() >= certified) continue;
-    certified = law.time * law.dilation();
-    best = parts.solution;
-    best_loads = law.loads;
+             FeedSolution solution, StretchLaw& law) {
+  StretchLaw now;  // without its grid
+  now.loads = law.loads;
+  now.time = law.time;
+  for (int n = 0; n < settings.tightenings && now.dilation() > kTightEnough; ++n) {
+    FeedMending mending{{}, kMended, {kLastGap}};
+    for (const FeedLoad& load : now.loads) mending.over.push_back(dilation_of(load));
+    draw_in(program, now.loads, kMended);
+    const std::vector<bool> changed = mend_law(program, mending, solution);
+    law.iterations += solution.iterations;
+    renew_loads(stretch, law.grid, solution.controls, changed, now.loads);
+    now.time = solution.time;
+    if (now.time * now.dilation() >= law.time * law.dilation()) continue;
+    law.controls = solution.controls;
+    law.time = now.time;
+    law.loads = now.loads;
   }
-  law.controls = std::move(best.controls);
-  law.time = best.time;
-  law.converged = best.converged;
-  law.loads = std::move(best_loads);
 }
 
 }  // namespace
@@ -274,9 +264,13 @@ StretchLaw solve_resting(const FeedStretch& stretch, const StretchSettings& sett
     law.grid = feed_grid(stretch, fine_elements(stretch, coarse, settings), settings.points, true);
   }
   FeedProgram program = make_program(stretch, law.grid, settings);
-  FeedParts parts = solve_in_parts(program, {{kFineGap}});
-  take(stretch, parts.solution, law);
-  tighten(stretch, settings, program, parts, law);
+  FeedSolution solution = solve_in_parts(program, {{kFineGap}}).solution;
+  law.iterations += solution.iterations;
+  law.controls = solution.controls;
+  law.time = solution.time;
+  law.converged = solution.converged;
+  law.loads = element_loads(stretch, law.grid, law.controls);
+  tighten(stretch, settings, program, std::move(solution), law);
   FeedProgram last = make_program(stretch, law.grid, settings);
   const double beta = constant_law(last);
   const double constant_time = stretch.map.extent() / std::sqrt(beta);
@@ -319,7 +313,7 @@ StretchLaw solve_moving(const FeedStretch& stretch, const MovingEnds& ends,
   };
   solve(std::move(start));
   for (int n = 0; n < settings.tightenings && law.converged && law.load().largest() > 1.0; ++n) {
-    draw_in(program, law.loads);
+    draw_in(program, law.loads, 0.0);
     solve(law.controls);
   }
   return law;

@@ -1,5 +1,7 @@
 #include "kernels/schedule/feed_parts.h"
 
+#include <tbb/global_control.h>
+
 #include <algorithm>
 #include <catch2/catch.hpp>
 
@@ -73,23 +75,67 @@ TEST_CASE("feed_parts: parts that never meet are solved as one", "[kernels][sche
   CHECK(parts.solution.time == Approx(2.0 * std::sqrt(1e6 / 1e3)).epsilon(2e-3));
 }
 
-TEST_CASE("feed_parts: rows that change are felt, others are not touched", "[kernels][schedule]") {
-  Problem p(5, 3000.0, 2000);
-  FeedParts parts = solve_in_parts(p.program, {{1e-6}});
-  const FeedSolution before = parts.solution;
-  std::vector<bool> changed(p.grid.elements.size(), false);
-  for (std::size_t i = 0; i < 5 * 10; ++i) p.program.factors[i].jerk = 1.2;  // ten elements
-  std::fill(changed.begin(), changed.begin() + 10, true);
-  solve_again(p.program, changed, 1.1, {{1e-6}}, parts);
-  CHECK(parts.solution.time > before.time);
-  CHECK(p.largest(parts.solution.controls) < 1.005);
-  CHECK(parts.solution.controls.back() == before.controls.back());
+TEST_CASE("mend_law: rows that are drawn in are kept, what is far from them stays",
+          "[kernels][schedule]") {
+  constexpr std::size_t kFirst = 700, kCount = 10, kReach = 24;
+  for (unsigned seed : {5u, 6u, 7u}) {
+    Problem p(seed, 3000.0, 2000);
+    const FeedSolution before = solve_in_parts(p.program, {{1e-6}}).solution;
+    const double inside = p.largest(before.controls);
+    FeedMending mending{std::vector<double>(p.grid.elements.size(), 1.0), 1.0005, {1e-6}};
+    for (std::size_t e = kFirst; e < kFirst + kCount; ++e) {
+      mending.over[e] = 1.03;
+      for (std::size_t i = 5 * e; i < 5 * (e + 1); ++i) p.program.factors[i] = {1.03, 1.06, 1.09};
+    }
+    FeedSolution mended = before;
+    const std::vector<bool> changed = mend_law(p.program, mending, mended);
+    CAPTURE(seed, mended.iterations);
+    CHECK(mended.time > before.time);
+    // What was let out beside it is all that may be above the limits.
+    CHECK(p.largest(mended.controls) < std::max(inside, 1.00041));
+    for (std::size_t e = 0; e < changed.size(); ++e)
+      CHECK(changed[e] == (e + kReach >= kFirst && e < kFirst + kCount + kReach));
+    // An element's law are its four controls: up to the run and behind it every bit is the same.
+    bool same = true;
+    for (std::size_t j = 0; j < mended.controls.size(); ++j)
+      if (j < kFirst - kReach + 3 || j >= kFirst + kCount + kReach)
+        same = same && mended.controls[j] == before.controls[j];
+    CHECK(same);
+    // The optimum of the whole with those rows is not faster by more than 1e-4.
+    const FeedSolution anew = solve_in_parts(p.program, {{1e-6}}).solution;
+    CHECK(mended.time < anew.time * (1.0 + 1e-4));
+  }
+}
+
+TEST_CASE("mend_law: both ends, and runs side by side, on any number of threads",
+          "[kernels][schedule]") {
+  Problem p(9, 1500.0, 600);
+  const FeedSolution before = solve_in_parts(p.program, {{1e-6}}).solution;
+  FeedMending mending{std::vector<double>(p.grid.elements.size(), 1.0), 1.0005, {1e-6}};
+  for (const std::size_t e : {std::size_t{0}, std::size_t{100}, std::size_t{150}, std::size_t{300},
+                              p.grid.elements.size() - 1}) {
+    mending.over[e] = 1.02;
+    for (std::size_t i = 5 * e; i < 5 * (e + 1); ++i) p.program.factors[i] = {1.02, 1.04, 1.06};
+  }
+  std::vector<double> first;
+  for (int threads : {1, 2, 4}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                    static_cast<std::size_t>(threads));
+    FeedSolution mended = before;
+    mend_law(p.program, mending, mended);
+    CHECK(p.largest(mended.controls) < 1.005);
+    if (first.empty()) first = mended.controls;
+    CHECK(mended.controls == first);
+  }
+  CHECK_FALSE(first == before.controls);
 }
 
 TEST_CASE("feed_parts: no fixed controls", "[kernels][schedule]") {
   Problem p(5, 100.0, 60);
   p.program.fixed_first = 2;
   CHECK_THROWS_AS(solve_in_parts(p.program, {}), ContractViolation);
+  FeedSolution solution;
+  CHECK_THROWS_AS(mend_law(p.program, {}, solution), ContractViolation);
 }
 
 TEST_CASE("feed_start: local_law and keep_inside break no row", "[kernels][schedule]") {
