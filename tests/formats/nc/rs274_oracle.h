@@ -2,6 +2,7 @@
 
 #include <array>
 #include <iosfwd>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,7 @@ struct OracleRun {
   bool accepted = false;
   bool inch = false;     ///< G20 was active at some time: the four printed decimals are of an inch
   bool rotated = false;  ///< an XY rotation was active at some time
+  double digit = 1e-4;   ///< the last printed decimal
   std::string message;   ///< the last line of its complaint
   std::vector<OracleMotion> motions;
   std::vector<std::string> messages;  ///< of DEBUG and PRINT comments, in order
@@ -42,6 +44,10 @@ void read_canonical(std::istream& text, OracleRun& run);
 /// Runs `rs274 -g` on the text in a folder of its own.
 OracleRun run_oracle(const std::string& text);
 
+/// The same interpreter by its Python module, with nine decimals and every tool of length 0, on the
+/// text of the last run_oracle(). Nothing when the module is not installed.
+std::optional<OracleRun> run_fine_oracle();
+
 /// How the oracle's machine is described to our interpreter.
 nc::InterpreterSettings oracle_settings();
 
@@ -53,7 +59,7 @@ struct Comparison {
   double worst = 0.0;
 };
 
-/// Ends, kinds, arcs and durations of our motions against those of the oracle, as far as its four
+/// Ends, kinds, arcs and durations of our motions against those of the oracle, as far as its
 /// printed decimals go. Its motions on the spot are passed over.
 Comparison compare(const std::vector<CanonicalMotion>& ours, const OracleRun& oracle);
 

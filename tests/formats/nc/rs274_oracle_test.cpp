@@ -1,5 +1,6 @@
 #include "tests/formats/nc/rs274_oracle.h"
 
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -13,6 +14,7 @@
 
 #include "kernels/core/units.h"
 #include "tests/formats/nc/recording.h"
+#include "tests/support/support.h"
 
 namespace smoothpost::test {
 namespace {
@@ -145,6 +147,28 @@ class OwnFolder {
   fs::path path_;
 };
 
+const fs::path& own_folder() {
+  static const OwnFolder folder;
+  return folder.path();
+}
+
+/// What a command in the own folder prints; its exit status. rs274 maps its tool table from a file
+/// in HOME: two runs at once must not share it.
+OracleRun run_in_folder(const std::string& command, int& status) {
+  const fs::path& folder = own_folder();
+  const int ended = std::system(("cd '" + folder.string() + "' && HOME=\"$PWD\" timeout 20 " +
+                                 command + " >out.txt 2>err.txt </dev/null")
+                                    .c_str());
+  status = WIFEXITED(ended) ? WEXITSTATUS(ended) : -1;
+  OracleRun run;
+  run.accepted = status == 0;
+  std::ifstream out(folder / "out.txt");
+  read_canonical(out, run);
+  std::ifstream err(folder / "err.txt");
+  for (std::string line; std::getline(err, line);) run.message += line + " | ";
+  return run;
+}
+
 }  // namespace
 
 nc::InterpreterSettings oracle_settings() {
@@ -166,19 +190,22 @@ void read_canonical(std::istream& text, OracleRun& run) {
 }
 
 OracleRun run_oracle(const std::string& text) {
-  static const OwnFolder folder;
-  std::ofstream(folder.path() / "p.ngc", std::ios::binary) << text;
-  std::ofstream(folder.path() / "v.var", std::ios::binary);
-  // rs274 maps its tool table from a file in HOME: two runs at once must not share it.
-  const std::string command = "cd '" + folder.path().string() +
-                              "' && HOME=\"$PWD\" timeout 20 rs274 -g -t tool.tbl -v v.var p.ngc "
-                              ">out.txt 2>err.txt </dev/null";
-  OracleRun run;
-  run.accepted = std::system(command.c_str()) == 0;
-  std::ifstream out(folder.path() / "out.txt");
-  read_canonical(out, run);
-  std::ifstream err(folder.path() / "err.txt");
-  for (std::string line; std::getline(err, line);) run.message += line + " | ";
+  const fs::path& folder = own_folder();
+  std::ofstream(folder / "p.ngc", std::ios::binary) << text;
+  std::ofstream(folder / "v.var", std::ios::binary);
+  int status = 0;
+  return run_in_folder("rs274 -g -t tool.tbl -v v.var p.ngc", status);
+}
+
+std::optional<OracleRun> run_fine_oracle() {
+  int status = 0;
+  OracleRun run =
+      run_in_folder("/usr/bin/python3 -B '" +
+                        source_path("tests/formats/nc/canonical_ends.py").string() + "' p.ngc",
+                    status);
+  constexpr int kNoModule = 77, kNoProgram = 127;
+  if (status == kNoModule || status == kNoProgram) return std::nullopt;
+  run.digit = 1e-6;
   return run;
 }
 
@@ -208,9 +235,9 @@ bool same_turns(const CanonicalMotion& ours, const OracleMotion& theirs) {
 
 Comparison compare(const std::vector<CanonicalMotion>& ours, const OracleRun& oracle) {
   Comparison out;
-  // Four printed decimals: half a unit of the last one, in the unit of the program; turned and
-  // shifted positions are sums of up to three such numbers.
-  const double digit = (oracle.inch ? kMillimetresPerInch : 1.0) * 1e-4;
+  // Half a unit of the last printed decimal, in the unit of the program; turned and shifted
+  // positions are sums of up to three such numbers.
+  const double digit = (oracle.inch ? kMillimetresPerInch : 1.0) * oracle.digit;
   const double tolerance = oracle.rotated || oracle.inch ? 3.0 * digit : 1.01 * digit;
   const auto& theirs_all = oracle.motions;
   const auto machine = [&](std::size_t k) {
