@@ -54,10 +54,58 @@ double number_of(std::string_view text) {
   return negative && value != 0.0 ? -value : value;
 }
 
+/// Reads "10,0.5,-2)" into `word` and returns its length, 0 when it is something else.
+std::size_t take_coefficients(std::string_view text, MpfWord& word) {
+  word.polynomial = true;
+  word.value.reset();
+  word.higher.clear();
+  std::size_t used = 0;
+  while (true) {
+    const std::size_t length = number_length(text.substr(used));
+    if (length == 0 || used + length >= text.size()) return 0;
+    const double number = number_of(text.substr(used, length));
+    if (word.value)
+      word.higher.push_back(number);
+    else
+      word.value = number;
+    used += length + 1;
+    if (text[used - 1] == ')') return used;
+    if (text[used - 1] != ',') return 0;
+  }
+}
+
+/// PO[X]=(..) or X=PO(..): its length at the start of `text`, 0 when it is something else.
+std::size_t take_polynomial(std::string_view text, MpfWord& word) {
+  constexpr std::size_t kCubic = 2, kQuintic = 4;  // higher coefficients
+  const std::string head = upper(text.substr(0, 3));
+  std::size_t before = 0, most = kCubic;
+  if (head == "PO[") {
+    const std::size_t name = name_length(text.substr(3));
+    word.address = upper(text.substr(3, name));
+    before = 3 + name;
+    if (name == 0 || text.substr(before, 3) != "]=(") return 0;
+    before += 3;
+  } else {
+    const std::size_t name = name_length(text);
+    word.address = upper(text.substr(0, name));
+    if (name == 0 || upper(text.substr(name, 4)) != "=PO(") return 0;
+    before = name + 4;
+    most = kQuintic;
+  }
+  const std::size_t length = take_coefficients(text.substr(before), word);
+  return length == 0 || word.higher.size() > most ? 0 : before + length;
+}
+
 /// Takes one word from the front of `text`; false when it is something else.
 bool take_word(std::string_view& text, MpfWord& word) {
   const std::size_t name = name_length(text);
   if (name == 0) return false;
+  if (const std::size_t length = take_polynomial(text, word); length > 0) {
+    if (length < text.size() && !is_blank(text[length])) return false;
+    text = trimmed(text.substr(length));
+    return true;
+  }
+  word = {};
   // X10.5: one letter, then its number. A3=1: the digits belong to the address.
   std::size_t used = name;
   if (used < text.size() && text[used] == '=') {
@@ -232,6 +280,7 @@ class Reader {
     for (std::size_t i = 0; i < block.words.size(); ++i) {
       const auto& word = block.words[i];
       if (word.address == "G" && word.value >= 0.0 && word.value <= 3.0) ++motions;
+      if (word.address == "POLY" && !word.value) ++motions;
       const bool many = word.address == "G" || word.address == "M";
       for (std::size_t j = 0; j < i; ++j)
         if (block.words[j].address == word.address && (!many || block.words[j].value == word.value))
@@ -239,7 +288,24 @@ class Reader {
       if (word.address.size() == 1 && !word.value)
         error("NC326", "word " + word.address + " has no number", block.column);
     }
-    if (motions > 1) error("NC326", "two of G0, G1, G2, G3 stand in one block", block.column);
+    if (motions > 1) error("NC326", "two of G0, G1, G2, G3, POLY stand in one block", block.column);
+    check_polynomials(block);
+  }
+
+  void check_polynomials(const MpfBlock& block) {
+    const bool any = std::any_of(block.words.begin(), block.words.end(),
+                                 [](const MpfWord& w) { return w.polynomial; });
+    const MpfWord* length = block.find("PL");
+    const bool poly = block.has("POLY");
+    if (!poly && (any || length != nullptr))
+      error("NC326", "PO and PL= stand in a block without POLY", block.column);
+    if (poly && !any) error("NC326", "POLY stands in a block without PO", block.column);
+    if (!poly) return;
+    if (length == nullptr || !length->value || length->polynomial)
+      return error("NC326", "POLY stands in a block without PL=, the length of its parameter",
+                   block.column);
+    if (*length->value < 0.0001 || *length->value > 99999.9999)
+      error("NC326", "PL= has to lie between 0.0001 and 99999.9999", block.column);
   }
 
   // A statement is a name with something behind it, or IF.

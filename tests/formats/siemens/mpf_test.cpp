@@ -68,3 +68,59 @@ TEST_CASE("mpf reader: malformed programs are refused", "[formats][siemens]") {
   }
   CHECK(parse_mpf("AA:\nGOTOB AA\nGOTOF BB\nBB:\nM30\n", "p").diagnostics.empty());
 }
+
+TEST_CASE("mpf reader: polynomials", "[formats][siemens]") {
+  const auto parsed = parse_mpf(
+      "UPATH\nN20 POLY PO[X]=(10,-.5,2) po[y]=(3) Z5 PL=1 F12\n"
+      "N30 POLY X=PO(-10.5,1,2,3,4) C=PO(0,0.25) PL=99999.9999 F3\nM30\n",
+      "p.mpf");
+  for (const auto& d : parsed.diagnostics) UNSCOPED_INFO(to_string(d));
+  REQUIRE(parsed.diagnostics.empty());
+  const auto& cubic = parsed.program.blocks[1];
+  REQUIRE(cubic.is_words);
+  CHECK(cubic.has("POLY"));
+  CHECK(cubic.find("X")->polynomial);
+  CHECK(cubic.find("X")->value == 10.0);
+  CHECK(cubic.find("X")->higher == std::vector<double>{-0.5, 2.0});
+  CHECK(cubic.find("Y")->polynomial);
+  CHECK(cubic.find("Y")->higher.empty());
+  CHECK_FALSE(cubic.find("Z")->polynomial);
+  CHECK(cubic.find("PL")->value == 1.0);
+  const auto& quintic = parsed.program.blocks[2];
+  CHECK(quintic.find("X")->value == -10.5);
+  CHECK(quintic.find("X")->higher == std::vector<double>{1.0, 2.0, 3.0, 4.0});
+  CHECK(quintic.find("C")->higher == std::vector<double>{0.25});
+}
+
+TEST_CASE("mpf reader: malformed polynomials are refused", "[formats][siemens]") {
+  const char* const kBad[] = {
+      "POLY PO[X]=(1,2,3,4) PL=1\nM30\n",        // four numbers in the notation of degree 3
+      "POLY X=PO(1,2,3,4,5,6) PL=1\nM30\n",      // six in that of degree 5
+      "POLY X=PO() PL=1\nM30\n",                 // none
+      "POLY X=PO(1,,3) PL=1\nM30\n",             // a number is missing
+      "POLY X=PO(1,2 PL=1\nM30\n",               // bracket
+      "POLY X=PO(1,2.5.1) PL=1\nM30\n",          // no number
+      "POLY X=PO(1,2E3) PL=1\nM30\n",            // exponent
+      "POLY PO[]=(1,2) PL=1\nM30\n",             // a denominator
+      "POLY PO[X=(1,2) PL=1\nM30\n",             // bracket
+      "POLY PO[X]=(1,2)Y3 PL=1\nM30\n",          // no blank behind it
+      "POLY PO[X]=(1,2) X=PO(1,2) PL=1\nM30\n",  // an axis twice
+      "POLY PO[X]=(1,2) X3 PL=1\nM30\n",         // likewise
+      "POLY PO[X]=(1,2)\nM30\n",                 // no PL
+      "POLY PO[X]=(1,2) PL=0\nM30\n",            // PL out of range
+      "POLY PO[X]=(1,2) PL=100000\nM30\n",       // likewise
+      "POLY PO[X]=(1,2) PO[PL]=(1)\nM30\n",      // PL is no axis
+      "POLY X1 PL=1\nM30\n",                     // no polynomial
+      "G1 PO[X]=(1,2) PL=1\nM30\n",              // polynomial without POLY
+      "G1 X1 PL=1\nM30\n",                       // PL without POLY
+      "G1 POLY PO[X]=(1,2) PL=1\nM30\n",         // two motions
+      "POLY=3 PO[X]=(1,2) PL=1\nM30\n",          // POLY is a keyword
+  };
+  for (const char* bad : kBad) {
+    INFO(bad);
+    const auto parsed = parse_mpf(bad, "p.mpf");
+    REQUIRE_FALSE(parsed.diagnostics.empty());
+    CHECK(parsed.diagnostics[0].code == "NC326");
+    CHECK(parsed.diagnostics[0].where.line == 1);
+  }
+}
