@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "kernels/core/canonical_motion.h"
+#include "kernels/core/joint_bend.h"
 #include "kernels/core/joints.h"
 #include "kernels/core/pose.h"
 #include "kernels/core/result.h"
@@ -47,9 +48,11 @@ struct MachineMove {
   double to_share = 1.0;           ///< role path: share of segment
   double blend = 0.0;              ///< mm: the control may round the corner at the end of this move
                                    ///< within this distance of it; 0: exact
-  bool spline = false;    ///< interpolation tool: one of a chain of moves whose ends the control
-                          ///< joins by a smooth curve of its own
-  double duration = 0.0;  ///< s; 0 for a rapid
+  bool spline = false;  ///< interpolation tool: one of a chain of moves whose ends the control
+                        ///< joins by a smooth curve of its own
+  JointBend bend;       ///< interpolation joints: polynomials in the place of straight joints; only
+                        ///< dialects with `polynomials` print them
+  double duration = 0.0;      ///< s; 0 for a rapid
   std::int32_t stretch = -1;  ///< role path: number of the stretch of the feed schedule; −1: none
   double stretch_time = 0.0;  ///< s, of that stretch at the end of the move
   double tool_length = 0.0;   ///< mm, of the tool in the holder
@@ -95,10 +98,13 @@ struct ReadBackMove {
   Pose tool = Pose::Identity();  ///< interpolation tool: X_WT at the end; `to` holds only the
                                  ///< joints that the block names (external axes)
   bool rapid = false;
-  bool beam = false;      ///< beam on while it moves
-  double blend = 0.0;     ///< mm, as MachineMove::blend
-  bool spline = false;    ///< as MachineMove::spline
-  double duration = 0.0;  ///< s, from F; 0 for a rapid
+  bool beam = false;          ///< beam on while it moves
+  double blend = 0.0;         ///< mm, as MachineMove::blend
+  bool spline = false;        ///< as MachineMove::spline
+  JointBend bend;             ///< as MachineMove::bend
+  Eigen::VectorXd deviation;  ///< a step in the place of a part of a bent move: no joint is further
+                              ///< from the straight way than this; empty: 0
+  double duration = 0.0;      ///< s, from F; 0 for a rapid
   std::uint32_t line = 0;
 };
 
@@ -140,7 +146,8 @@ struct Dialect {
   /// Reads program text as that controller would; errors NC1xx. `file_name` is for messages.
   Result<ReadBack> (*read_back)(const MachineDefinition& machine, std::string text,
                                 const std::string& file_name);
-  const char* guard;  ///< what the program's guard makes sure of, for the certificate
+  const char* guard;         ///< what the program's guard makes sure of, for the certificate
+  bool polynomials = false;  ///< prints MachineMove::bend
 };
 
 }  // namespace smoothpost

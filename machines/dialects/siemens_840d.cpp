@@ -37,6 +37,8 @@ class Emitter {
     has_poses_ = std::any_of(program.moves.begin(), program.moves.end(), [](const MachineMove& m) {
       return m.interpolation == MoveInterpolation::tool;
     });
+    has_bends_ = std::any_of(program.moves.begin(), program.moves.end(),
+                             [](const MachineMove& m) { return m.bend.rows() > 0; });
     out_.move_lines.reserve(program.moves.size());
     out_.text.reserve(96 * program.moves.size() + 4096);
   }
@@ -70,6 +72,12 @@ class Emitter {
     if (machine_.dialect.path_mode != "exact")
       refuse("dialect siemens_840d has no path_mode \"" + machine_.dialect.path_mode +
              "\": what G642 rounds off has no bound for rotary axes; write path_mode = \"exact\"");
+    const bool bent_rapid =
+        std::any_of(program_.moves.begin(), program_.moves.end(),
+                    [](const MachineMove& m) { return m.rapid && m.bend.rows() > 0; });
+    if (bent_rapid) refuse("a rapid along polynomials has no words in dialect siemens_840d");
+    if (has_bends_ && has_poses_)
+      refuse("polynomials stand in programs of joint words only: write dialect.mode = \"joint\"");
     static constexpr std::string_view kLetters = "XYZABCUVWPQ";
     for (const auto& axis : machine_.axes)
       if (kLetters.find(axis.letter) == std::string_view::npos)
@@ -103,6 +111,7 @@ class Emitter {
     const bool inch = machine_.dialect.units == "inch";
     put_block(std::string("G17 ") + (inch ? "G700" : "G710") + " G90 G94 G40 G60 G601 " +
               (machine_.links.rapid == RapidMotion::linear ? "RTLION" : "RTLIOF"));
+    if (has_bends_) put_block("UPATH");
     mode_ = Mode::unknown;
     inverse_time_ = false;
     forget_words();
@@ -287,8 +296,9 @@ class Emitter {
     const bool tool = move.interpolation == MoveInterpolation::tool;
     set_mode(tool ? Mode::tool : Mode::joints);
     set_time_mode(!move.rapid);
-    std::string block = move.rapid ? "G0" : "G1";
-    block += tool ? tool_words(move) : joint_words(move);
+    const bool bent = degree(move) > 1;
+    std::string block = move.rapid ? "G0" : bent ? "POLY" : "G1";
+    block += tool ? tool_words(move) : bent ? bent_words(move) : joint_words(move);
     if (!move.rapid) {
       const double f = kSecondsPerMinute / move.duration;
       block += " F" + decimal(f, f < 10.0 ? 7 : f < 1000.0 ? 5 : 3);
@@ -315,13 +325,54 @@ class Emitter {
   }
 
   std::string joint_word(int j, double value) const {
+    return std::string(1, machine_.axes[static_cast<std::size_t>(j)].letter) + number(j, value);
+  }
+
+  // Of joint j, in the program's units.
+  std::string number(int j, double value) const {
     const auto& axis = machine_.axes[static_cast<std::size_t>(j)];
-    std::string word(1, axis.letter);
-    if (axis.joint.kind == JointKind::rotary)
-      append_decimal(word, degrees_from_radians(value), machine_.dialect.digits_angle);
-    else
-      append_decimal(word, value * length_scale_, machine_.dialect.digits_length);
-    return word;
+    return axis.joint.kind == JointKind::rotary
+               ? decimal(degrees_from_radians(value), machine_.dialect.digits_angle)
+               : decimal(value * length_scale_, machine_.dialect.digits_length);
+  }
+
+  // The coefficients of joint j as printed, without zeros at the end.
+  std::vector<std::string> coefficients(const MachineMove& move, int j) const {
+    std::vector<std::string> printed;
+    for (Eigen::Index k = 0; k < move.bend.cols(); ++k)
+      printed.push_back(number(j, move.bend(j, k)));
+    while (!printed.empty() && printed.back() == "0") printed.pop_back();
+    return printed;
+  }
+
+  // Highest power that is left of a move's polynomials in the printed digits.
+  std::size_t degree(const MachineMove& move) const {
+    std::size_t most = 1;
+    for (int j = 0; j < machine_.size() && move.bend.rows() > 0; ++j)
+      if (move.joints >> j & 1U) most = std::max(most, coefficients(move, j).size() + 1);
+    return most;
+  }
+
+  // Polynomials over 0 to 1, in the older notation where it is enough. An axis that comes back to
+  // where it was has to be named as well.
+  std::string bent_words(const MachineMove& move) {
+    const bool cubic = degree(move) <= 3;
+    std::string words;
+    for (int j = 0; j < machine_.size(); ++j) {
+      if (!(move.joints >> j & 1U)) continue;
+      std::string& last = printed_[static_cast<std::size_t>(j)];
+      const std::string end = joint_word(j, move.to[j]);
+      const std::vector<std::string> higher = coefficients(move, j);
+      if (higher.empty() && end != last) words += " " + end;
+      if (!higher.empty()) {
+        const std::string letter = end.substr(0, 1);
+        words += (cubic ? " PO[" + letter + "]=(" : " " + letter + "=PO(") + end.substr(1);
+        for (const std::string& coefficient : higher) words += "," + coefficient;
+        words += ")";
+      }
+      last = end;
+    }
+    return words + " PL=1";
   }
 
   std::string tool_words(const MachineMove& move) {
@@ -352,6 +403,7 @@ class Emitter {
   std::vector<std::string> labels_;
   double length_scale_ = 1.0;
   bool has_poses_ = false;
+  bool has_bends_ = false;
   bool inverse_time_ = false;
   Mode mode_ = Mode::unknown;
   std::uint64_t block_number_ = 0;

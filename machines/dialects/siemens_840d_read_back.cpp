@@ -213,7 +213,7 @@ class Reading {
   static bool is_motion(const MpfBlock& block) {
     for (const double g : {0.0, 1.0, 2.0, 3.0})
       if (block.has('G', g)) return true;
-    return false;
+    return block.has("POLY");
   }
 
   // G words and axis words of an event would act behind our back.
@@ -224,7 +224,8 @@ class Reading {
         return true;
       for (const auto& axis : machine_.axes)
         if (word.value && word.address == std::string(1, axis.letter)) return true;
-      for (const char* keyword : {"TRAORI", "TRAFOOF", "TRANS", "ROT", "SUPA", "RTLIOF", "G4"})
+      for (const char* keyword : {"TRAORI", "TRAFOOF", "TRANS", "ROT", "SUPA", "RTLIOF", "G4",
+                                  "POLY", "UPATH", "SPATH", "FGROUP", "POLYPATH"})
         if (word.address == keyword) return true;
     }
     return false;
@@ -235,8 +236,8 @@ class Reading {
   // A block of modal words. False, with nothing changed, when it holds a word that is not ours.
   bool read_setting(const MpfBlock& block) {
     if (block.has('G', 4.0)) return read_dwell(block);
-    static const std::set<std::string> kWords = {"TRAORI", "TRAFOOF", "ORIWKS", "ORIVECT",
-                                                 "RTLION", "RTLIOF",  "STOPRE", "TRANS"};
+    static const std::set<std::string> kWords = {"TRAORI", "TRAFOOF", "ORIWKS", "ORIVECT", "RTLION",
+                                                 "RTLIOF", "STOPRE",  "TRANS",  "UPATH"};
     static const std::set<double> kCodes = {17, 40, 54, 60, 90, 93, 94, 500, 601, 700, 710};
     for (const auto& word : block.words) {
       const bool code = word.address == "G" && word.value && kCodes.count(*word.value) > 0;
@@ -259,6 +260,7 @@ class Reading {
       forget();
     }
     if (word.address == "ORIWKS") in_part_ = true;
+    if (word.address == "UPATH") by_parameter_ = true;
     if (word.address == "ORIVECT") great_circle_ = true;
     if (word.address != "G") return;
     const double g = *word.value;
@@ -304,7 +306,9 @@ class Reading {
                    "a motion stands before G710 or G700, G90, G60 and TRAORI or TRAFOOF are set");
     ReadBackMove move;
     move.rapid = block.has('G', 0.0);
-    if (!move.rapid && !block.has('G', 1.0)) return error(block, "an arc is not one of ours");
+    const bool bent = block.has("POLY");
+    if (!move.rapid && !bent && !block.has('G', 1.0))
+      return error(block, "an arc is not one of ours");
     move.line = block.line;
     move.beam = beam_;
     move.to = JointVector::Zero(machine_.size());
@@ -316,9 +320,24 @@ class Reading {
     } else if (f != nullptr) {
       return error(block, "F in a block of G0");
     }
+    if (bent && !may_bend(block)) return;
     if (transformation_ ? read_pose(block, move) : read_joints(block, move))
       result.moves.push_back(std::move(move));
   }
+
+  // A polynomial begins where the axis stands, and the path has to follow its parameter: with SPATH
+  // axes outside of FGROUP follow the length of the others' way.
+  bool may_bend(const MpfBlock& block) {
+    const char* why = transformation_          ? "a polynomial under TRAORI is not one of ours"
+                      : !by_parameter_         ? "a polynomial without UPATH"
+                      : block.has("SUPA")      ? "a polynomial with SUPA is not one of ours"
+                      : known_ != all_joints() ? "a polynomial before every axis has a position"
+                                               : nullptr;
+    if (why != nullptr) error(block, why);
+    return why == nullptr;
+  }
+
+  JointMask all_joints() const { return (JointMask{1} << machine_.size()) - 1U; }
 
   bool read_joints(const MpfBlock& block, ReadBackMove& move) {
     const bool suppressed = block.has("SUPA");
@@ -328,16 +347,18 @@ class Reading {
     if (!suppressed && frame_ != Frame::zero)
       return error(block, "joint words with an offset: SUPA or G500 is missing"), false;
     int joints = 0;
+    if (block.has("POLY")) move.bend = JointBend::Zero(machine_.size(), 4);
     for (const auto& word : block.words) {
-      if (word.address == "G" || word.address == "F" || word.address == "D" ||
-          word.address == "SUPA")
-        continue;
+      static const std::set<std::string> kOthers = {"G", "F", "D", "SUPA", "POLY", "PL"};
+      if (!word.polynomial && kOthers.count(word.address) > 0) continue;
       const int j = word.address.size() == 1 ? machine_.axis_by_letter(word.address[0]) : -1;
       if (j < 0 || !word.value)
         return error(block, "word " + word.address + " is no axis of the machine"), false;
       const bool rotary =
           machine_.axes[static_cast<std::size_t>(j)].joint.kind == JointKind::rotary;
+      const double unit = rotary ? radians_from_degrees(1.0) : scale_;
       joints_[j] = rotary ? radians_from_degrees(*word.value) : *word.value * scale_;
+      if (word.polynomial) read_bend(*block.find("PL")->value, unit, word, j, move);
       known_ |= 1U << j;
       ++joints;
     }
@@ -345,6 +366,16 @@ class Reading {
     move.to = joints_;
     move.known = known_;
     return true;
+  }
+
+  // The control's p runs from 0 to `length`, ours from 0 to 1.
+  static void read_bend(double length, double unit, const MpfWord& word, int j,
+                        ReadBackMove& move) {
+    double power = length;
+    for (std::size_t k = 0; k < word.higher.size(); ++k) {
+      power *= length;
+      move.bend(j, static_cast<Eigen::Index>(k)) = word.higher[k] * unit * power;
+    }
   }
 
   bool read_pose(const MpfBlock& block, ReadBackMove& move) {
@@ -401,6 +432,7 @@ class Reading {
   bool transformation_known_ = false;
   bool in_part_ = false;
   bool great_circle_ = false;
+  bool by_parameter_ = false;  // UPATH
   bool beam_ = false;
   Vec3 tip_ = Vec3::Zero();
   Vec3 axis_ = Vec3::UnitZ();

@@ -148,6 +148,124 @@ TEST_CASE("siemens_840d: read_back(emit(x)) is x to the printed digits in joints
     }
 }
 
+namespace {
+
+/// Some of the feeds become polynomials, of degree 3 or 5, some joints of them straight.
+void bend_some(MachineProgram& program, std::mt19937& rng, int degree) {
+  std::bernoulli_distribution half(0.5);
+  std::normal_distribution<double> normal;
+  for (std::size_t i = 1; i < program.moves.size(); ++i) {
+    MachineMove& move = program.moves[i];
+    if (move.rapid || half(rng)) continue;
+    move.bend = JointBend::Zero(move.to.size(), 4);
+    for (Eigen::Index j = 0; j < move.to.size(); ++j)
+      for (Eigen::Index k = 0; k < degree - 1; ++k)
+        if (half(rng)) move.bend(j, k) = normal(rng);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("siemens_840d: read_back(emit(x)) is x to the printed digits along polynomials",
+          "[machines][dialects]") {
+  std::mt19937 rng(52);
+  std::size_t bent = 0;
+  for (const char* name : {"head_table_bc", "laser_5p1"})
+    for (const char* units : {"mm", "inch"})
+      for (const int degree : {3, 5}) {
+        const auto machine = shipped_machine(name, {{"dialect.units", units}});
+        const double length = 0.5 * std::pow(10.0, -machine.dialect.digits_length) *
+                              (std::string(units) == "inch" ? kMillimetresPerInch : 1.0);
+        const double angle =
+            radians_from_degrees(0.5 * std::pow(10.0, -machine.dialect.digits_angle));
+        for (int round = 0; round < 100; ++round) {
+          auto program = random_program(machine, rng, 8, false);
+          bend_some(program, rng, degree);
+          check_same(machine, program);
+          const std::string text = emitted_text(machine, program);
+          CHECK((text.find("=PO(") == std::string::npos || degree == 5));
+          const auto back = read(machine, text);
+          for (std::size_t i = 0; i < program.moves.size(); ++i) {
+            const JointBend& planned = program.moves[i].bend;
+            const JointBend& found = back.moves[i].bend;
+            if (planned.rows() == 0 || planned.isZero()) {
+              REQUIRE(found.rows() == 0);
+              continue;
+            }
+            REQUIRE(found.rows() == machine.size());
+            ++bent;
+            for (int j = 0; j < machine.size(); ++j) {
+              const bool rotary =
+                  machine.axes[static_cast<std::size_t>(j)].joint.kind == JointKind::rotary;
+              REQUIRE((planned.row(j) - found.row(j)).cwiseAbs().maxCoeff() <=
+                      (rotary ? angle : length) * (1 + 1e-6));
+            }
+          }
+        }
+      }
+  CHECK(bent > 1000);
+}
+
+TEST_CASE("siemens_840d: a polynomial says where the axis is on the way", "[machines][dialects]") {
+  const auto machine = shipped_machine("head_table_bc", {{"dialect.offset_guard", "false"}});
+  // The manual's example in X, over 0 to 2: f = 10 + a1 p − 2.5 p² with f(2) = 0.
+  const auto back = read(machine,
+                         "N1 TRAFOOF\nG17 G710 G90 G94 G40 G60 G601 RTLION\nUPATH\nG500 D0\n"
+                         "G0 X10 Y0 Z0 B0 C0\nG93\nPOLY PO[X]=(0,-2.5) C=PO(30,1,2,3,4) PL=2 F60\n"
+                         "G94\nM30\n");
+  REQUIRE(back.moves.size() == 2);
+  const JointBend& bend = back.moves[1].bend;
+  REQUIRE(bend.rows() == machine.size());
+  const int x = machine.axis_by_letter('X'), c = machine.axis_by_letter('C');
+  CHECK(back.moves[1].to[x] == 0.0);
+  CHECK(bend(x, 0) == Approx(-10.0));
+  CHECK(bend.row(x).tail(3).isZero());
+  for (int k = 0; k < 4; ++k)
+    CHECK(bend(c, k) == Approx(radians_from_degrees((k + 1) * std::pow(2.0, k + 2))));
+  CHECK(bend.row(machine.axis_by_letter('Y')).isZero());
+}
+
+TEST_CASE("siemens_840d: polynomials that could move differently are refused",
+          "[machines][dialects]") {
+  const auto machine = shipped_machine("head_table_bc", {{"dialect.offset_guard", "false"}});
+  const std::string head = "TRAFOOF\nG17 G710 G90 G94 G40 G60 G601 RTLION\n";
+  const std::string start = "G500 D0\nG0 X10 Y0 Z0 B0 C0\nG93\n";
+  const std::string poly = "POLY PO[X]=(0,-2.5) PL=1 F60\n", end = "G94\nM30\n";
+  const auto refused = [&](const std::string& text) {
+    INFO(text);
+    const auto back = siemens_840d::read_back(machine, text, "p");
+    CHECK_FALSE(back.ok());
+  };
+  REQUIRE(siemens_840d::read_back(machine, head + "UPATH\n" + start + poly + end, "p").ok());
+  refused(head + start + poly + end);                                       // no UPATH
+  refused(head + "SPATH\n" + start + poly + end);                           // along the length
+  refused(head + "UPATH\n" + start + "SPATH\n" + poly + end);               // back to it
+  refused(head + "UPATH\n" + start + "POLYPATH(\"VECT\")\n" + poly + end);  // axes straight
+  refused(head + "UPATH\n" + start + "G94\n" + poly + end);                 // F is no time
+  refused(head + "UPATH\n" + start + "POLY PO[X]=(0,-2.5) PL=1\n" + end);   // no F
+  refused(head + "UPATH\nG500 D0\nG93\n" + poly + end);                     // from nowhere
+  refused(head + "UPATH\nG500 D0\nG0 X10 Y0 Z0 B0\nG93\n" + poly + end);    // C unknown
+  refused(head + "UPATH\n" + start + "POLY SUPA PO[X]=(0,-2.5) PL=1 F60\n" + end);
+  refused(head + "UPATH\n" + start + "D1\n" + poly + end);
+  refused(head + "UPATH\n" + start + "POLY PO[U]=(0,-2.5) PL=1 F60\n" + end);  // no such axis
+  refused(head + "UPATH\n" + start + "POLY PO[F]=(60,1) PO[X]=(0,1) PL=1\n" + end);
+  refused(head + "UPATH\n" + start + "D1\nTRAORI\nG54\nORIWKS ORIVECT\n" +
+          "POLY PO[X]=(0,-2.5) Y0 Z0 A3=0 B3=0 C3=1 PL=1 F60\nTRAFOOF\n" + end);
+  // An event's words neither.
+  auto with_event = machine;
+  with_event.process.events.push_back({"gas_on", "SPATH", true, 0.0, 0.0});
+  CHECK_FALSE(
+      siemens_840d::read_back(with_event, head + "UPATH\n" + start + "SPATH\n" + poly + end, "p")
+          .ok());
+  // In a program with moves of the tool nothing is printed.
+  std::mt19937 rng(53);
+  auto program = random_program(machine, rng, 12, true);
+  program.moves[0].bend = JointBend::Ones(machine.size(), 4);
+  const auto mixed = siemens_840d::emit(machine, program);
+  REQUIRE_FALSE(mixed.ok());
+  CHECK(mixed.diagnostics()[0].code == "PR203");
+}
+
 TEST_CASE("siemens_840d: modes change only where the interpolation does", "[machines][dialects]") {
   std::mt19937 rng(43);
   const auto machine = shipped_machine("head_table_bc");
