@@ -140,14 +140,15 @@ struct DialectSettings {
   std::string mode = "joint";  ///< joint | tcp
   std::string units = "mm";    ///< mm | inch
   std::string extension = "ngc";
-  int digits_length = 5;      ///< decimals of lengths, in `units`
-  int digits_angle = 6;       ///< decimals of angles, in degrees
-  double block_time = 0.0;    ///< s; 0: as is best for the control
+  int digits_length = 5;    ///< decimals of lengths, in `units`
+  int digits_angle = 6;     ///< decimals of angles, in degrees
+  double block_time = 0.0;  ///< s; 0: as is best for the control
   bool line_numbers = true;
   std::vector<std::string> start;
   std::vector<std::string> end;
   bool offset_guard = true;
   std::string path_mode = "exact";  ///< exact | blend | spline
+  std::string curves = "lines";  ///< lines | cubic | quintic: what scheduled blocks of joints are
 };
 
 /// Tip speed (mm/s) to power (percent), monotone; empty when the machine has no beam power.
