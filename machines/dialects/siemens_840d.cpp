@@ -427,6 +427,7 @@ const Dialect kDialect = {"siemens_840d",
                           &emit,
                           &read_back,
                           "the frame and the tool length that are active in the control are those "
-                          "that the program names: it stops before its first motion otherwise"};
+                          "that the program names: it stops before its first motion otherwise",
+                          true};
 
 }  // namespace smoothpost::siemens_840d
