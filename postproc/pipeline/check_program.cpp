@@ -116,6 +116,17 @@ Checks shape_checks(const CheckInput& in, const FollowedProgram& program, const 
                            degrees_from_radians(program.axis_allowance), "deg")};
 }
 
+/// Straight steps stand for bent moves: what the control does may be that far from them.
+void allow_bends(const CheckInput& in, const ScrewChain& chain, FollowedProgram& program) {
+  double longest = std::max(0.0, in.tool_length);
+  if (in.against)
+    for (const PathPoint& point : in.against->path.points)
+      longest = std::max(longest, point.tool_length);
+  const StepAllowance bends = step_allowance(program.read, chain, longest);
+  program.tip_allowance += bends.tip;
+  program.axis_allowance += bends.axis;
+}
+
 /// Joints of tool moves; the tool's length is the one that the program's own tool frame has, or the
 /// one that the user gave.
 bool follow_program(const CheckInput& in, const ScrewChain& chain, const Dialect& dialect,
@@ -125,14 +136,17 @@ bool follow_program(const CheckInput& in, const ScrewChain& chain, const Dialect
     return m.interpolation == MoveInterpolation::tool;
   });
   const auto inverse = Inverse::from(chain);
-  if (!any || !inverse) {
-    if (any)
-      out.diagnostics.push_back(
-          diagnostic("KN110", "machine " + in.machine.name +
-                                  " has no closed form: its joints on tool moves "
-                                  "are not known in this version"));
-    return !any;
+  if (any && !inverse)
+    out.diagnostics.push_back(diagnostic("KN110", "machine " + in.machine.name +
+                                                      " has no closed form: its joints on tool "
+                                                      "moves are not known in this version"));
+  if (!any) {
+    ControllerMotion motion =
+        follow_joints(std::move(read), chain, follow_settings(in.machine, ToolTurn::none, {}));
+    read = motion.steps ? std::move(*motion.steps) : std::move(motion.read);
+    allow_bends(in, chain, program);
   }
+  if (!any || !inverse) return !any;
   double length = in.tool_length;
   if (read.tool_frame)
     length = -in.machine.tool.axis.dot((in.machine.tool.flange * *read.tool_frame).translation() -
@@ -163,6 +177,7 @@ bool follow_program(const CheckInput& in, const ScrewChain& chain, const Dialect
     out.assumes.push_back(
         blending_assumption(in.machine.dialect.path_mode == "spline" ? "spline" : "blend"));
   read = motion.steps ? std::move(*motion.steps) : std::move(motion.read);
+  allow_bends(in, chain, program);
   return true;
 }
 

@@ -87,7 +87,8 @@ ClearanceReport check_clearance(const Scene& scene, const ReadBack& joints,
     if (i == 0 || (joints.moves[i - 1].known & all) != all) continue;
     const JointVector& from = joints.moves[i - 1].to;
     MotionSettings settings;
-    settings.deviation = wandering(from, move, machine);
+    settings.deviation =
+        move.deviation.size() > 0 ? JointVector(move.deviation) : wandering(from, move, machine);
     const MotionReport report = check_motion(scene, from, move.to, settings, &cache);
     if (report.verdict != MotionVerdict::free) {
       ++out.moves;

@@ -63,15 +63,20 @@ void into_part(ReadBack& read, const MachineDefinition& machine, const Pose& par
   }
 }
 
-Result<ControllerMotion> follow(ReadBack read, const MachineDefinition& machine,
-                                const Inverse& inverse, ToolTurn turn,
-                                const std::function<double(std::size_t)>& tool_length) {
+FollowSettings follow_settings(const MachineDefinition& machine, ToolTurn turn,
+                               std::function<double(std::size_t)> tool_length) {
   FollowSettings settings;
   settings.turn = turn;
   settings.tip_tolerance = kStepShare * machine.tolerance.tip;
   settings.axis_tolerance = kStepShare * machine.tolerance.axis;
-  settings.tool_length = tool_length;
-  return follow_controller(std::move(read), inverse, settings);
+  settings.tool_length = std::move(tool_length);
+  return settings;
+}
+
+Result<ControllerMotion> follow(ReadBack read, const MachineDefinition& machine,
+                                const Inverse& inverse, ToolTurn turn,
+                                const std::function<double(std::size_t)>& tool_length) {
+  return follow_controller(std::move(read), inverse, follow_settings(machine, turn, tool_length));
 }
 
 void describe_promises(const MachineDefinition& machine, bool has_part, Conversion& out) {

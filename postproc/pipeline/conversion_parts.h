@@ -84,7 +84,11 @@ class PartCheck {
 void into_part(ReadBack& read, const MachineDefinition& machine, const Pose& part,
                const std::function<double(std::size_t)>& tool_length);
 
-/// follow_controller() with the machine's tolerances.
+/// The steps' tolerances are kStepShare of the machine's.
+FollowSettings follow_settings(const MachineDefinition& machine, ToolTurn turn,
+                               std::function<double(std::size_t)> tool_length);
+
+/// follow_controller() with follow_settings().
 Result<ControllerMotion> follow(ReadBack read, const MachineDefinition& machine,
                                 const Inverse& inverse, ToolTurn turn,
                                 const std::function<double(std::size_t)>& tool_length);

@@ -14,6 +14,7 @@
 #include "postproc/pipeline/controller_blending.h"
 #include "postproc/pipeline/conversion_notes.h"
 #include "postproc/pipeline/conversion_parts.h"
+#include "postproc/pipeline/curve_blocks.h"
 #include "postproc/pipeline/finish_plan.h"
 #include "postproc/pipeline/joint_plan.h"
 #include "postproc/pipeline/laser_loop.h"
@@ -251,6 +252,10 @@ class Converter {
     plan_blending(program_, in_.machine, chain_);
     if (follows_power(in_.machine))
       power_ = follow_power(program_, reference_, out_.schedule, in_.machine);
+    if (in_.machine.dialect.curves != "lines") {
+      join_into_curves(program_, {reference_, out_.schedule, in_.machine, chain_});
+      out_.assumes.push_back(curve_assumption(in_.machine));
+    }
     if (!built.cramped.empty()) {
       out_.diagnostics.push_back(diagnostic(
           "LK104",

@@ -45,6 +45,15 @@ void check_dialect(const MachineDefinition& machine, const Dialect& dialect, Ref
   if (settings.path_mode != "exact" && turn != ToolTurn::slerp)
     refusals.refuse("dialect.path_mode", settings.path_mode,
                     "exact (the rounding of this control has no bound that is known)");
+  if (settings.curves != "lines" && !dialect.polynomials)
+    refusals.refuse("dialect.curves", settings.curves,
+                    "lines (this dialect prints no polynomials)");
+  if (settings.curves != "lines" && settings.mode == "tcp")
+    refusals.refuse("dialect.curves", settings.curves,
+                    "lines (polynomials are of joints: dialect.mode = \"joint\" has them)");
+  if (settings.curves != "lines" && machine.recipe.task == "pose")
+    refusals.refuse("dialect.curves", settings.curves,
+                    "lines (the rotation about the tool is proven for straight joints only)");
 }
 
 void check_smoothing(const MachineDefinition& machine, const ToolPath& input, Refusals& refusals) {

@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "kernels/core/units.h"
+#include "kernels/kinematics/bent_motion.h"
+#include "kernels/spline/bent_move.h"
 #include "postproc/pipeline/tool_motion.h"
 #include "postproc/pipeline/worst.h"
 
@@ -12,6 +14,7 @@ namespace smoothpost {
 
 namespace {
 
+constexpr double kMostSteps = 512.0, kMostBentSteps = 8192.0;  // of a block, and of a polynomial
 constexpr double kPrintedRotation = 1e-4;  // deg, that a printed orientation may be off
 
 bool is_rotary(const AxisDefinition& axis) { return axis.joint.kind == JointKind::rotary; }
@@ -77,12 +80,16 @@ void check_axes(const ReadBack& read, const MachineDefinition& machine,
       const ReadBackMove& move = read.moves[i];
       if (move.known >> j & 1U) {
         const double q = move.to[j];
-        share.see(std::abs(q - mid) / half, move.line, times[i]);
-        summary.position_low = first ? q * scale : std::min(summary.position_low, q * scale);
-        summary.position_high = first ? q * scale : std::max(summary.position_high, q * scale);
+        // A step of a bent move: h²/8·|q''| off the straight way is 4/h times that in q'.
+        const double off = move.deviation.size() > 0 ? move.deviation[j] : 0.0;
+        share.see((std::abs(q - mid) + off) / half, move.line, times[i]);
+        const double low = (q - off) * scale, high = (q + off) * scale;
+        summary.position_low = first ? low : std::min(summary.position_low, low);
+        summary.position_high = first ? high : std::max(summary.position_high, high);
         first = false;
         if (!move.rapid && move.duration > 0.0 && from.size() > 0)
-          speed.see(std::abs(q - from[j]) / move.duration * scale, move.line, times[i]);
+          speed.see((std::abs(q - from[j]) + 4.0 * off) / move.duration * scale, move.line,
+                    times[i]);
       }
       from = move.to;
     }
@@ -330,8 +337,9 @@ class DeviationCheck {
     const bool by_tool = move.interpolation == MoveInterpolation::tool;
     const Pose start = by_tool ? start_pose(i, tool_length) : Pose::Identity();
     const JointVector& from = read_.moves[i - 1].to;
+    const BentMove joints{from, move.to, move.bend};
     auto own = by_tool ? tool_motion_bound(start, move.tool, in_.turn, in_.chain.tool_axis)
-                       : second_derivative_bound(in_.chain, from, move.to);
+                       : joint_motion_bound(joints);
     if (!by_tool) own.tip += tool_length * own.axis;
     const double allowance = by_tool ? turn_allowance(start, move.tool, in_.turn) : 0.0;
     for (const Piece& piece : pieces_of(in_.map[i])) {
@@ -340,18 +348,26 @@ class DeviationCheck {
       const auto input = in_.reference.second_derivative_bound(piece.segment);
       const double tip_bend = part * part * own.tip + span * span * input.tip;
       const double axis_bend = part * part * own.axis + span * span * input.axis;
-      const int steps = std::max(steps_for(tip_bend, axis_bend), orientation_steps(piece));
+      const double most = joints.bend.rows() > 0 ? kMostBentSteps : kMostSteps;
+      const int steps = std::max(steps_for(tip_bend, axis_bend, most), orientation_steps(piece));
       if (orientation_) orientation_->begin();
       const double h2 = 1.0 / (8.0 * steps * steps);
       for (int k = 0; k <= steps; ++k) {
         const double share = static_cast<double>(k) / steps;
         const double t = piece.t0 + share * part;
         const Pose pose = by_tool ? tool_motion(start, move.tool, t, in_.turn, in_.chain.tool_axis)
-                                  : tip_pose(in_.chain, from + t * (move.to - from), tool_length);
+                                  : tip_pose(in_.chain, joints_at(joints, t), tool_length);
         const double s = piece.from + share * span;
         compare_pose_at(i, pose, {piece.segment, s}, {h2 * tip_bend, h2 * axis_bend + allowance});
       }
     }
+  }
+
+  SecondDerivativeBound joint_motion_bound(const BentMove& joints) const {
+    if (joints.bend.rows() == 0) return second_derivative_bound(in_.chain, joints.from, joints.to);
+    const BendBounds bounds = bend_bounds(joints);
+    return bent_motion_bound(
+        in_.chain, {joints_at(joints, 0.5), rates_at(joints, 0.5), bounds.rate, bounds.second});
   }
 
   int orientation_steps(const Piece& piece) const {
@@ -467,21 +483,29 @@ class DeviationCheck {
   }
 
   // So many that the allowance between samples is at most a fiftieth of the tolerance.
-  int steps_for(double tip_bend, double axis_bend) const {
+  int steps_for(double tip_bend, double axis_bend, double most) const {
     const double share = std::max(tip_bend / (0.02 * 8.0 * machine_.tolerance.tip),
                                   axis_bend / (0.02 * 8.0 * machine_.tolerance.axis));
-    return static_cast<int>(std::clamp(std::ceil(std::sqrt(share)), 2.0, 512.0));
+    return static_cast<int>(std::clamp(std::ceil(std::sqrt(share)), 2.0, most));
   }
 
   void compare_joints(std::size_t i) {
     const MachineMove& planned = in_.planned.moves[i];
     if (planned.interpolation == MoveInterpolation::tool) compare_pose(i, planned);
-    for (int j = 0; j < machine_.size(); ++j)
-      if (planned.joints >> j & 1U)
-        joints_[static_cast<std::size_t>(j)].see(
-            std::abs(planned.to[j] - read_.moves[i].to[j]) *
-                display_scale(machine_.axes[static_cast<std::size_t>(j)]),
-            read_.moves[i].line, times_[i], planned.input_line);
+    for (int j = 0; j < machine_.size(); ++j) {
+      if (!(planned.joints >> j & 1U)) continue;
+      double off = std::abs(planned.to[j] - read_.moves[i].to[j]);
+      for (Eigen::Index k = 0; k < 4; ++k)
+        off = std::max(off,
+                       std::abs(bend_of(planned.bend, j, k) - bend_of(read_.moves[i].bend, j, k)));
+      joints_[static_cast<std::size_t>(j)].see(
+          off * display_scale(machine_.axes[static_cast<std::size_t>(j)]), read_.moves[i].line,
+          times_[i], planned.input_line);
+    }
+  }
+
+  static double bend_of(const JointBend& bend, int j, Eigen::Index k) {
+    return bend.rows() > 0 ? bend(j, k) : 0.0;
   }
 
   void compare_pose(std::size_t i, const MachineMove& planned) {

@@ -112,3 +112,24 @@ TEST_CASE("recipe_check: every schedule is for every machine", "[postproc][pipel
     CHECK(mill({{"recipe.schedule", schedule}}).empty());
   }
 }
+
+TEST_CASE("recipe: curves are for dialects that print polynomials, and for joints",
+          "[postproc][pipeline]") {
+  const auto problems = [](const std::vector<MachineOverride>& overrides, bool polynomials) {
+    const Dialect dialect{"d",     "", "",         ToolTurn::great_circle, true, nullptr,
+                          nullptr, "", polynomials};
+    std::string all;
+    for (const auto& d : recipe_problems(shipped_machine("head_table_bc", overrides), dialect, {}))
+      all += d.code + ": " + d.text + "\n";
+    return all;
+  };
+  const MachineOverride joint{"dialect.mode", "joint"}, tcp{"dialect.mode", "tcp"};
+  for (const char* curves : {"cubic", "quintic"}) {
+    const MachineOverride key{"dialect.curves", curves};
+    CHECK(problems({joint, key}, true).empty());
+    CHECK(says(problems({joint, key}, false), "prints no polynomials"));
+    CHECK(says(problems({tcp, key}, true), "polynomials are of joints"));
+    CHECK(says(problems({joint, key, {"recipe.task", "pose"}}, true), "straight joints only"));
+  }
+  CHECK(problems({joint}, false).empty());
+}
