@@ -188,6 +188,9 @@ LetterMask BlockPlanner::letters_of_g_codes(const BlockWords& block) const {
   if (sets_tool_data(block)) used |= letter_bit('Q');
   if (block.code(GGroup::path_control) == 640) used |= letter_bit('P') | letter_bit('Q');
   if (block.code(GGroup::length_offset) == 430) used |= letter_bit('H');
+  const GCode compensation = block.code(GGroup::radius_compensation);
+  if (compensation != kNoCode && compensation != 400) used |= letter_bit('D');
+  if (compensation == 411 || compensation == 421) used |= letter_bit('L');
   return used & block.letters;
 }
 
@@ -195,8 +198,13 @@ LetterMask BlockPlanner::letters_of_g_codes(const BlockWords& block) const {
 LetterMask BlockPlanner::letters_of_motion(const BlockWords& block) const {
   if (plan_.motion == 52) return letter_bit('P') | letter_bit('L');
   if (is_spline(plan_.motion)) return letter_bit('P') | letter_bit('Q');
-  LetterMask used = letter_bit('R') | letter_bit('L');
   const GCode cycle = plan_.motion;
+  if (cycle == 330 || cycle == 331) return 0;
+  LetterMask used = letter_bit('R') | letter_bit('L');
+  if (cycle == 760) {
+    used |= letter_bit('P') | letter_bit('Q') | letter_bit('H') | letter_bit('E');
+    return used & block.letters;
+  }
   const bool fanuc = dialect_ != InputDialect::linuxcnc;
   if (cycle == 730 || cycle == 830) used |= letter_bit('Q');
   if (cycle == 740 || cycle == 820 || cycle == 840 || cycle == 860 || cycle == 890 || fanuc) {
@@ -243,7 +251,8 @@ void BlockPlanner::check_arc_words(const BlockWords& block) {
   if (!is_arc(plan_.motion)) {
     LetterMask used = 0;
     if (plan_.motion == 50 || plan_.motion == 51) used = letter_bit('I') | letter_bit('J');
-    if (plan_.motion == 870) used = kCentreLetters;
+    if (plan_.motion == 870 || plan_.motion == 760) used = kCentreLetters;
+    if (plan_.motion == 330 || plan_.motion == 331) used = letter_bit('K');
     if (is_cycle(plan_.motion) && dialect_ == InputDialect::fanuc) used = letter_bit('K');
     if (sets_tool_data(block)) used = letter_bit('I') | letter_bit('J');
     if (block.code(GGroup::non_modal) == kMacroCall) used = kCentreLetters;
@@ -327,14 +336,6 @@ void BlockPlanner::check_tool_data(const BlockWords& block) {
   }
   if (block.has('Q') && (!is_whole(block['Q']) || block['Q'] < -0.5 || block['Q'] > 9.5)) {
     refuse("NC218", "G10: Q is the orientation of a lathe tool, 0 to 9", place);
-  }
-}
-
-/// G65: a number behind P, a count behind L; G, M, N, O and axis words of a motion have no place.
-void BlockPlanner::check_macro_call(const BlockWords& block) {
-  const TextPlace place = at(block, GGroup::non_modal);
-  if (block.code(GGroup::motion) != kNoCode || block.m_count != 0) {
-    refuse("NC256", "G65 and its arguments stand alone; write other codes on a line before", place);
   }
 }
 

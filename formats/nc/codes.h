@@ -78,6 +78,8 @@ bool is_flow_m(int m, InputDialect dialect);
 inline bool is_cycle(GCode code) {
   return code == 730 || code == 740 || (code >= 810 && code <= 890);
 }
+/// G33, G33.1, G76.
+inline bool is_synchronised(GCode code) { return code == 330 || code == 331 || code == 760; }
 /// G5, G5.1, G5.2.
 inline bool is_spline(GCode code) { return code >= 50 && code <= 52; }
 

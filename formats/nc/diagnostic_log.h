@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "kernels/core/diagnostic.h"
@@ -29,6 +30,12 @@ class DiagnosticLog {
 
   void error(const char* code, std::string text, TextPlace place) {
     add(Severity::error, code, std::move(text), place);
+  }
+  /// In the program's own text, wherever the run is.
+  void program_error(const char* code, std::string text, TextPlace place) {
+    const std::size_t file = std::exchange(file_, 0);
+    add(Severity::error, code, std::move(text), place);
+    file_ = file;
   }
   void warning(const char* code, std::string text, TextPlace place) {
     add(Severity::warning, code, std::move(text), place);

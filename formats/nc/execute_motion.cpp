@@ -95,6 +95,7 @@ void Executor::begin_motion(const BlockWords& block, const BlockPlan& plan) {
   motion_.programmed = plan.axes;
   motion_.line = block.input_line;
   motion_.duration = 0.0;
+  motion_.pitch = 0.0;
   motion_.start = coordinates_.world();
   motion_.column = reader_.input_place(block, block.first_piece).column;
   motion_.axis_vector = false;
@@ -154,6 +155,7 @@ void Executor::change_mode(GCode mode, const BlockWords& block) {
 /// A motion that stands for several.
 void Executor::expanded_motion(const BlockWords& block, const BlockPlan& plan, GCode before) {
   if (is_cycle(plan.motion)) return cycle(block, plan, before);
+  if (is_synchronised(plan.motion)) return synchronised(block, plan);
   if (is_spline(plan.motion)) spline(block, plan, before);
 }
 

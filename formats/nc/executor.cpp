@@ -35,7 +35,12 @@ Executor::Executor(const Program& program, const InterpreterSettings& settings,
     : dialect_(program.dialect),
       settings_(settings),
       matcher_(matcher),
-      sink_(sink),
+      radius_(sink,
+              [this](const std::string& text, const CanonicalMotion& motion) {
+                log_.program_error("NC264", "cutter radius compensation: " + text,
+                                   {motion.line, motion.column});
+              }),
+      sink_(radius_),
       log_(program.file_name),
       coordinates_(settings),
       tools_(tool_table(settings)),
@@ -64,6 +69,7 @@ Result<InterpretationSummary> Executor::run() {
   if (program.has_flow) tell_flow_faults(*unit_);
   while (run_block()) {
   }
+  radius_.end();
   if (program.first_fault != 0 && !log_.has_error()) {
     log_.error("NC200", "this line has text that could not be read; mend what the reader named",
                {program.first_fault, 1});
@@ -166,6 +172,7 @@ void Executor::block(const BlockWords& block) {
 /// The order of execution on one line that the LinuxCNC manual gives.
 void Executor::act(const BlockWords& block, const BlockPlan& plan) {
   if (block.comment_piece != BlockWords::kNone) comment(block);
+  if (radius_.is_on()) check_under_compensation(block, plan);
   if (!is_linuxcnc()) {
     set_units(block);
     warn_dialect(block);
@@ -180,6 +187,7 @@ void Executor::act(const BlockWords& block, const BlockPlan& plan) {
     if (block.has('D')) tool_edge(block);
     if (block.statements != 0) statements(block);
   }
+  if (block.code(GGroup::radius_compensation) != kNoCode) radius_compensation(block);
   if (block.code(GGroup::length_offset) != kNoCode) tool_length(block);
   if (block.code(GGroup::work_system) != kNoCode) work_system(block);
   set_modes(block);

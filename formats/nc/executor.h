@@ -14,6 +14,7 @@
 #include "formats/nc/modal_state.h"
 #include "formats/nc/program_unit.h"
 #include "formats/nc/spline_curve.h"
+#include "formats/nc/tool_radius.h"
 #include "formats/nc/tool_table.h"
 #include "formats/nc/word_values.h"
 
@@ -22,11 +23,11 @@ namespace smoothpost::nc {
 /// Runs the blocks of one program in the order of execution of RS274NGC.
 ///
 /// One object runs one program. What a block does in which order stands in executor.cpp, motion in
-/// execute_motion.cpp, cycles in execute_cycles.cpp, splines in execute_splines.cpp, offsets in
-/// execute_offsets.cpp, tools in execute_tools.cpp, process words and comments in
-/// execute_process.cpp, loops and branches in execute_flow.cpp, calls in execute_calls.cpp, saved
-/// modal state in execute_saved_state.cpp, what only other controls have in execute_dialects.cpp
-/// and execute_siemens.cpp.
+/// execute_motion.cpp, cycles in execute_cycles.cpp, threads in execute_threads.cpp, splines in
+/// execute_splines.cpp, offsets in execute_offsets.cpp, tools in execute_tools.cpp, cutter radius
+/// in execute_radius.cpp, process words and comments in execute_process.cpp, loops and branches in
+/// execute_flow.cpp, calls in execute_calls.cpp, saved modal state in execute_saved_state.cpp, what
+/// only other controls have in execute_dialects.cpp and execute_siemens.cpp.
 class Executor {
  public:
   Executor(const Program& program, const InterpreterSettings& settings, const EventMatcher& matcher,
@@ -58,6 +59,8 @@ class Executor {
   void message(std::string_view text, std::uint32_t line, std::uint32_t column);
   void dwell(const BlockWords& block);
 
+  void radius_compensation(const BlockWords& block);
+  void check_under_compensation(const BlockWords& block, const BlockPlan& plan);
   void tool_length(const BlockWords& block);
   void set_tool_length(double length, int tool, std::uint32_t line);
   void work_system(const BlockWords& block);
@@ -111,6 +114,11 @@ class Executor {
   void drill(const BlockWords& block, const BlockPlan& plan, const CycleHole& hole);
   void cycle_move(const BlockWords& block, const BlockPlan& plan, MotionKind kind,
                   const AxisWords& program);
+  std::string why_not_synchronised(const BlockPlan& plan) const;
+  void synchronised(const BlockWords& block, const BlockPlan& plan);
+  void synchronised_move(const BlockWords& block, const BlockPlan& plan, const AxisWords& end,
+                         double pitch);
+  std::string thread(const BlockWords& block, const BlockPlan& plan);
   void spline(const BlockWords& block, const BlockPlan& plan, GCode before);
   bool may_stand_in_spline(const BlockWords& block);
   void add_control_point(const BlockWords& block, const BlockPlan& plan);
@@ -157,7 +165,8 @@ class Executor {
   const InputDialect dialect_;
   const InterpreterSettings& settings_;
   const EventMatcher& matcher_;
-  CanonicalSink& sink_;
+  RadiusCompensation radius_;
+  CanonicalSink& sink_;  ///< radius_, behind which the caller's sink is
   DiagnosticLog log_;
   ModalState modal_;
   Coordinates coordinates_;

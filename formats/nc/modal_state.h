@@ -43,6 +43,7 @@ struct ModalState {
   bool arc_absolute = false;
   bool inverse_time = false;
   bool tcp = false;
+  GCode radius_compensation = 400;        ///< G40, G41 or G42
   bool vector_words = false;              ///< fanuc G43.5: I J K are the tool axis
   bool by_vector = false;                 ///< the tool axis was last given by a vector
   bool machine_vectors = false;           ///< siemens ORIMKS

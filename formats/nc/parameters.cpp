@@ -85,6 +85,11 @@ double Parameters::length_in(double unit, std::size_t axis, double value) const 
 
 ParameterValue Parameters::position(std::size_t axis, const std::string& name, bool machine) const {
   const Coordinates& coordinates = state_.coordinates;
+  if (state_.modal.radius_compensation != 400) {
+    return {0.0, name +
+                     " is a position of the tool's centre under cutter radius compensation, which "
+                     "the next motion changes; write G40 before"};
+  }
   if (((coordinates.unknown() >> axis) & 1) != 0) {
     return {0.0, name +
                      " is a position that the program has not given yet; move there by a program "
@@ -203,8 +208,8 @@ std::optional<double> Parameters::computed(std::string_view name) const {
   if (name == "_retract_old_z") return flag(modal.retract_to_old);
   if (name == "_ijk_absolute_mode") return flag(modal.arc_absolute);
   if (name == "_lathe_radius_mode" || name == "_spindle_rpm_mode") return 1.0;
-  if (name == "_ccomp" || name == "_lathe_diameter_mode" || name == "_units_per_rev" ||
-      name == "_spindle_css_mode") {
+  if (name == "_ccomp") return modal.radius_compensation;
+  if (name == "_lathe_diameter_mode" || name == "_units_per_rev" || name == "_spindle_css_mode") {
     return 0.0;
   }
   if (name == "_vmajor") return 2.9;

@@ -115,6 +115,14 @@ void BlockPlanner::check_machine_position(const BlockWords& block, const ModalSt
   }
 }
 
+/// G65: a number behind P, a count behind L; G, M, N, O and axis words of a motion have no place.
+void BlockPlanner::check_macro_call(const BlockWords& block) {
+  const TextPlace place = at(block, GGroup::non_modal);
+  if (block.code(GGroup::motion) != kNoCode || block.m_count != 0) {
+    refuse("NC256", "G65 and its arguments stand alone; write other codes on a line before", place);
+  }
+}
+
 bool BlockPlanner::check_fanuc_g10(const BlockWords& block) {
   if (block.has('L') && block['L'] == 2.0 && block.has('P') && block['P'] >= 0.5 &&
       block['P'] <= 6.5 && !block.has('R')) {

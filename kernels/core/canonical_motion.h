@@ -48,6 +48,9 @@ struct CanonicalMotion {
   std::uint32_t line = 0;   ///< 1-based line of the input
   std::uint32_t column = 0;
   double duration = 0.0;  ///< s at the programmed feed; 0 for a rapid
+  /// Way in mm for each turn of the spindle that the motion follows (G33, G76); below 0: while the
+  /// spindle turns back, out of a rigid tap; 0: it follows time.
+  double pitch = 0.0;
   AxisWords start{};
   AxisWords end{};
   /// Unit, tip to spindle, in W. Zero: unknown; when the rotary words are known, the one that the

@@ -60,6 +60,13 @@ class CanonicalReader {
       plane_ = is("_XZ") ? 1 : is("_YZ") ? 2 : 0;
     } else if (is("SET_FEED_RATE")) {
       feed_ = values.at(0) * unit_;
+    } else if (is("RIGID_TAP")) {
+      const std::array<double, 6> start = program_;
+      OracleMotion motion;
+      std::copy_n(values.begin(), 3, program_.begin());
+      push(motion);
+      program_ = start;  // the tap comes back by itself
+      push(motion);
     } else if (is("STRAIGHT_TRAVERSE") || is("STRAIGHT_FEED")) {
       OracleMotion motion;
       motion.rapid = is("TRAVERSE");
@@ -226,7 +233,7 @@ double distance(const std::array<double, 6>& a, const std::array<double, 6>& b) 
 /// Sweep of our arc against sense and turns that rs274 printed.
 bool same_turns(const CanonicalMotion& ours, const OracleMotion& theirs) {
   const double circles = std::abs(ours.arc.sweep) / (2.0 * kPi);
-  const int turns = static_cast<int>(std::ceil(circles - 1e-9));
+  const int turns = static_cast<int>(std::ceil(circles - 1e-6));
   const double sign = ours.arc.sweep > 0.0 ? 1.0 : -1.0;
   return turns * sign == theirs.turns;
 }
