@@ -178,6 +178,10 @@ bool RadiusCompensation::enter_by_arc(Element& element, const CanonicalMotion& m
                 motion);
   end.radius = chord.squaredNorm() / (2.0 * along);
   end.centre = place + end.radius * spoke;
+  if (!is_tool_inside(end, settings_.tool) && end.radius <= settings_.tool.radius)
+    return fail("the arc onto the contour has the radius " + length_text(end.radius) +
+                    ", not above that of the tool, " + length_text(settings_.tool.radius),
+                motion);
   return true;
 }
 
