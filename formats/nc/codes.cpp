@@ -104,7 +104,7 @@ constexpr Row kRows[] = {
     {923, GGroup::non_modal, kRead, "stored shift"},
     {930, GGroup::feed_mode, kRead, "inverse time feed"},
     {940, GGroup::feed_mode, kRead, "feed by the minute"},
-    {950, GGroup::feed_mode, kSynchronised, "feed by the turn"},
+    {950, GGroup::feed_mode, kExpanded, "feed by the turn"},
     {960, GGroup::spindle_mode, kLater, "constant surface speed"},
     {970, GGroup::spindle_mode, kRead, "spindle speed"},
     {980, GGroup::retract, kRead, "retract to the old height"},
@@ -153,6 +153,7 @@ constexpr Row kFanucRows[] = {
     {760, GGroup::motion, kLater, "fine boring cycle"},
     {870, GGroup::motion, kLater, "back boring cycle"},
     {921, GGroup::non_modal, kLater, "preset of the work system"},
+    {950, GGroup::feed_mode, kSynchronised, "feed by the turn"},
 };
 
 constexpr Row kHaasRows[] = {

@@ -105,6 +105,8 @@ void Executor::begin_motion(const BlockWords& block, const BlockPlan& plan) {
 
 void Executor::finish_motion() {
   if (offset_dirty_) announce_offset(motion_.line);
+  const bool by_turn = modal_.per_turn && motion_.kind == MotionKind::feed;
+  if (by_turn && motion_.pitch == 0.0) motion_.pitch = modal_.linear_feed;
   sink_.motion(motion_);
   coordinates_.move_to(motion_.end, motion_.unknown_end);
   // Where the rotary axes are is the machine's affair then.
@@ -120,11 +122,14 @@ double Executor::duration_of(const CanonicalMotion& motion, double xyz_length,
   const bool turns = motion.axis_vector && motion.start_axis.dot(motion.end_axis) < 1.0 - 1e-14;
   if (xyz_length < kNoMove && uvw < kNoMove && abc < kNoMove && !turns) return 0.0;
   if (modal_.inverse_time) return kSecondsPerMinute / block['F'];
-  if (xyz_length >= kNoMove) return xyz_length / modal_.linear_feed;
-  if (uvw >= kNoMove) return uvw / modal_.linear_feed;
-  if (!turns) return abc / modal_.angular_feed;
+  const double turns_per_second = modal_.words.speed / kSecondsPerMinute;
+  const double linear_speed = modal_.linear_feed * (modal_.per_turn ? turns_per_second : 1.0);
+  const double angular_speed = modal_.angular_feed * (modal_.per_turn ? turns_per_second : 1.0);
+  if (xyz_length >= kNoMove) return xyz_length / linear_speed;
+  if (uvw >= kNoMove) return uvw / linear_speed;
+  if (!turns) return abc / angular_speed;
   const double cosine = std::clamp(motion.start_axis.dot(motion.end_axis), -1.0, 1.0);
-  return std::acos(cosine) / modal_.angular_feed;
+  return std::acos(cosine) / angular_speed;
 }
 
 bool Executor::feed_given(const BlockWords& block, const BlockPlan& plan) {
@@ -135,10 +140,18 @@ bool Executor::feed_given(const BlockWords& block, const BlockPlan& plan) {
                at(block, GGroup::motion));
     return false;
   }
+  if (modal_.per_turn && (!is_turning() || !(modal_.words.speed > 0.0))) {
+    log_.error("NC213",
+               code +
+                   " feeds by the turn (G95), but the spindle does not turn; write S "
+                   "and M3 or M4 before",
+               at(block, GGroup::motion));
+    return false;
+  }
   if (modal_.linear_feed > 0.0) return true;
   log_.error("NC213",
              code + " with zero feed: F was not given" +
-                 (block.has('F') ? " above 0" : " (after G93 a new F is needed)") +
+                 (block.has('F') ? " above 0" : " (after G93 and G95 a new F is needed)") +
                  "; write F before or in this block",
              at(block, GGroup::motion));
   return false;
@@ -154,6 +167,10 @@ void Executor::change_mode(GCode mode, const BlockWords& block) {
 
 /// A motion that stands for several.
 void Executor::expanded_motion(const BlockWords& block, const BlockPlan& plan, GCode before) {
+  if (radius_.stands_beside())
+    return error("NC264",
+                 "the first motion behind G40 is a cycle, spline or thread; write G0 or G1 before",
+                 block, block.first_piece);
   if (is_cycle(plan.motion)) return cycle(block, plan, before);
   if (is_synchronised(plan.motion)) return synchronised(block, plan);
   if (is_spline(plan.motion)) spline(block, plan, before);

@@ -27,6 +27,7 @@ void Executor::save_state(bool restores) {
   saved.incremental = modal_.incremental;
   saved.arc_absolute = modal_.arc_absolute;
   saved.inverse_time = modal_.inverse_time;
+  saved.per_turn = modal_.per_turn;
   saved.retract_to_old = modal_.retract_to_old;
   saved.linear_feed = modal_.linear_feed;
   saved.angular_feed = modal_.angular_feed;
@@ -43,12 +44,18 @@ void Executor::save_state(bool restores) {
 
 /// The motion mode stays, as in LinuxCNC. Spindle and coolant are switched where they differ.
 void Executor::restore_state(const SavedState& saved, const BlockWords& block) {
+  if (radius_.is_on())
+    return error("NC264",
+                 "the saved state (M70, M73) comes back under cutter radius compensation; write "
+                 "G40 before",
+                 block, block.first_piece);
   modal_.unit = saved.unit;
   modal_.feed_unit = saved.feed_unit;
   modal_.plane = saved.plane;
   modal_.incremental = saved.incremental;
   modal_.arc_absolute = saved.arc_absolute;
   modal_.inverse_time = saved.inverse_time;
+  modal_.per_turn = saved.per_turn;
   modal_.retract_to_old = saved.retract_to_old;
   modal_.linear_feed = saved.linear_feed;
   modal_.angular_feed = saved.angular_feed;

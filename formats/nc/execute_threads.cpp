@@ -39,8 +39,7 @@ std::string Executor::why_not_synchronised(const BlockPlan& plan) const {
   if (modal_.tcp) return "it is not read in tool-centre-point mode; write M429 before";
   if (modal_.inverse_time) return "no such motion in inverse time mode; write G94";
   if (radius_.is_on()) return "no such motion under cutter radius compensation; write G40";
-  if (modal_.spindle != 3 && modal_.spindle != 4)
-    return "the spindle does not turn; write M3 or M4";
+  if (!is_turning()) return "the spindle does not turn; write M3 or M4";
   if (!(modal_.words.speed > 0.0)) return "the spindle has no speed; write S";
   return {};
 }

@@ -206,9 +206,12 @@ void Executor::set_feed_mode(const BlockWords& block) {
   const GCode mode = block.code(GGroup::feed_mode);
   if (mode == kNoCode) return;
   const bool inverse = mode == 930;
-  // After inverse time a new feed is required.
-  if (modal_.inverse_time && !inverse) modal_.linear_feed = modal_.angular_feed = 0.0;
+  const bool per_turn = mode == 950;
+  // After inverse time, and by and after feed by the turn, a new feed is required.
+  if ((modal_.inverse_time && !inverse) || modal_.per_turn || per_turn)
+    modal_.linear_feed = modal_.angular_feed = 0.0;
   modal_.inverse_time = inverse;
+  modal_.per_turn = per_turn;
 }
 
 /// F is taken in the units that are active before this line's G20 or G21, as LinuxCNC does; the
@@ -216,8 +219,9 @@ void Executor::set_feed_mode(const BlockWords& block) {
 void Executor::set_feed(const BlockWords& block) {
   if (!block.has('F') || modal_.inverse_time) return;
   if (is_siemens() && block.code(GGroup::non_modal) == 40) return;  // seconds
-  modal_.linear_feed = block['F'] * modal_.feed_unit / kSecondsPerMinute;
-  modal_.angular_feed = radians_from_degrees(block['F']) / kSecondsPerMinute;
+  const double seconds = modal_.per_turn ? 1.0 : kSecondsPerMinute;
+  modal_.linear_feed = block['F'] * modal_.feed_unit / seconds;
+  modal_.angular_feed = radians_from_degrees(block['F']) / seconds;
 }
 
 void Executor::set_units(const BlockWords& block) {

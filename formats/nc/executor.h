@@ -127,6 +127,7 @@ class Executor {
                      const std::vector<ControlNet>& curves);
   void set_tool_data(const BlockWords& block);
 
+  bool is_turning() const { return modal_.spindle == 3 || modal_.spindle == 4; }
   bool is_linuxcnc() const { return dialect_ == InputDialect::linuxcnc; }
   bool is_siemens() const { return dialect_ == InputDialect::siemens; }
   void statements(const BlockWords& block);

@@ -42,6 +42,7 @@ struct ModalState {
   bool incremental = false;
   bool arc_absolute = false;
   bool inverse_time = false;
+  bool per_turn = false;  ///< G95
   bool tcp = false;
   GCode radius_compensation = 400;        ///< G40, G41 or G42
   bool vector_words = false;              ///< fanuc G43.5: I J K are the tool axis
@@ -53,8 +54,8 @@ struct ModalState {
   Vec3 axis = Vec3::Zero();               ///< world, from tip to spindle; zero: not given
   double unit = 1.0;                      ///< mm per unit of a linear word
   double feed_unit = 1.0;                 ///< mm per unit of a feed
-  double linear_feed = 0.0;               ///< mm/s
-  double angular_feed = 0.0;              ///< rad/s, for moves of rotary words only
+  double linear_feed = 0.0;               ///< mm/s; G95: mm for each turn of the spindle
+  double angular_feed = 0.0;              ///< rad/s, for moves of rotary words only; G95: as above
   ModalWords words;                       ///< S and the selected T
   int spindle_tool = 0;                   ///< tool of the last M6; 0: none yet
   std::string spindle_tool_name;          ///< siemens: its name, when it has one

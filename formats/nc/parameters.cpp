@@ -186,7 +186,8 @@ std::optional<double> Parameters::computed(std::string_view name) const {
   if (name == "_absolute") return flag(!modal.incremental);
   if (name == "_incremental") return flag(modal.incremental);
   if (name == "_inverse_time") return flag(modal.inverse_time);
-  if (name == "_units_per_minute") return flag(!modal.inverse_time);
+  if (name == "_units_per_minute") return flag(!modal.inverse_time && !modal.per_turn);
+  if (name == "_units_per_rev") return flag(modal.per_turn);
   if (name == "_plane") return modal.plane;
   if (name == "_motion_mode") return modal.motion < 0 ? 800.0 : modal.motion;
   if (name == "_current_tool") return modal.spindle_tool;
@@ -195,7 +196,8 @@ std::optional<double> Parameters::computed(std::string_view name) const {
   if (name == "_call_level") return state_.place.call_level;
   if (name == "_value") return result_.value_or(0.0);
   if (name == "_value_returned") return flag(result_.has_value());
-  if (name == "_feed") return modal.linear_feed * kSecondsPerMinute / modal.unit;
+  if (name == "_feed")
+    return modal.linear_feed * (modal.per_turn ? 1.0 : kSecondsPerMinute) / modal.unit;
   if (name == "_rpm") return modal.words.speed;
   if (name == "_spindle_on") return flag(modal.spindle == 3 || modal.spindle == 4);
   if (name == "_spindle_cw") return flag(modal.spindle == 3);
@@ -209,7 +211,7 @@ std::optional<double> Parameters::computed(std::string_view name) const {
   if (name == "_ijk_absolute_mode") return flag(modal.arc_absolute);
   if (name == "_lathe_radius_mode" || name == "_spindle_rpm_mode") return 1.0;
   if (name == "_ccomp") return modal.radius_compensation;
-  if (name == "_lathe_diameter_mode" || name == "_units_per_rev" || name == "_spindle_css_mode") {
+  if (name == "_lathe_diameter_mode" || name == "_spindle_css_mode") {
     return 0.0;
   }
   if (name == "_vmajor") return 2.9;

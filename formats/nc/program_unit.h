@@ -27,7 +27,8 @@ struct ProgramUnit {
 struct SavedState {
   double unit = 1.0, feed_unit = 1.0;
   GCode plane = 170;
-  bool incremental = false, arc_absolute = false, inverse_time = false, retract_to_old = false;
+  bool incremental = false, arc_absolute = false, inverse_time = false, per_turn = false,
+       retract_to_old = false;
   double linear_feed = 0.0, angular_feed = 0.0, speed = 0.0;
   int system = 1;
   double tool_length = 0.0;

@@ -54,6 +54,9 @@ class RadiusCompensation final : public CanonicalSink {
   /// Motions are changed: on, with a radius above 0.
   bool shifts() const { return on_ && settings_.tool.radius > 0.0; }
 
+  /// It has ended, and no motion has come since.
+  bool stands_beside() const { return beside_contour_ && !on_; }
+
   void motion(const CanonicalMotion& motion) override;
   void dwell(double seconds, std::uint32_t line) override;
   void event(const ProcessEvent& event) override;

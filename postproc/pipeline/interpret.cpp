@@ -108,9 +108,9 @@ class PathBuilder {
       programmed_ |= m.programmed;
       if (m.pitch != 0.0 && !has_error(diagnostics_))
         fail("NC316", m.line,
-             "this motion follows the turning of the spindle (a thread, a rigid tap; the first of "
-             "such motions), which no output of this version does: let the CAM post write feeds "
-             "by time, or keep this operation on its control",
+             "this motion follows the turning of the spindle (a thread, a rigid tap, a feed by the "
+             "turn; first of such motions), which no output of this version does: let the CAM post "
+             "write feeds by time, or keep this operation on its control",
              m.column);
       if (m.kind == MotionKind::feed) last_feed_ = i + 1;
       if (m.tcp)

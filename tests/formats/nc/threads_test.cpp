@@ -133,6 +133,30 @@ TEST_CASE("threads: wrong words and states are refused", "[formats][nc][threads]
         "NC202");
 }
 
+TEST_CASE("threads: feeds by the turn", "[formats][nc][threads]") {
+  const Run r = turning("G95 F0.5\nG1 X20\nS240\nG2 X30 I5\nG0 X0\nG94 F600\nG1 X10");
+  INFO(r.all_text());
+  REQUIRE(r.ok);
+  const auto& m = r.sink.motions;
+  REQUIRE(m.size() == 5);
+  CHECK(m[1].pitch == 0.5);
+  CHECK(m[1].duration == Approx(10.0 / (0.5 * 2.0)));
+  CHECK(m[2].pitch == 0.5);
+  CHECK(m[2].duration == Approx(5.0 * kPi / (0.5 * 4.0)));
+  CHECK(m[3].pitch == 0.0);
+  CHECK(m[4].pitch == 0.0);
+  CHECK(m[4].duration == Approx(1.0));
+  CHECK(turning("G20 G95\nF0.01 G1 X1").sink.motions.back().pitch == Approx(0.254));
+  const Run print = turning("G95 F0.5\n(PRINT,#<_feed> #<_units_per_rev> #<_units_per_minute>)");
+  CHECK(print.sink.comments == Codes{"PRINT,0.500000 1.000000 0.000000"});
+  for (const char* lines : {"G95\nG1 X20", "G95 F1\nG95\nG1 X20", "G95 F1\nG94\nG1 X20",
+                            "M5\nG95 F1\nG1 X20", "S0\nG95 F1\nG1 X20"}) {
+    INFO(lines);
+    CHECK(turning(lines).errors() == Codes{"NC213"});
+  }
+  CHECK(turning("G95 F1\nG5 X30 I5 P5 Q0 J0").errors() == Codes{"NC262"});
+}
+
 TEST_CASE("threads: against rs274 in 150 random threads", "[formats][nc][threads][oracle]") {
   if (!oracle_present()) {
     WARN("rs274 is not installed: skipped");

@@ -362,6 +362,32 @@ TEST_CASE("interpret: the part's frame is the program's zero whatever the work o
   CHECK((tip - (Vec3(20, -10, 30) - Vec3(10, 20, 30))).norm() < 1e-9);
 }
 
+TEST_CASE("interpret: motions that follow the spindle are refused with their line",
+          "[postproc][pipeline]") {
+  for (const char* motion : {"G33 Z-5 K1", "G33.1 Z-5 K1", "G18 G76 P1 Z-5 I-3 J1 K2"}) {
+    const auto r = interpret_nc(
+        "%\nG21 G90 F100\nG0 X0 Y0 Z0 A0 C0\nS100 M3\n" + std::string(motion) + "\nG0 Z5\nM30\n%\n",
+        posted_for("table_table_ac"));
+    INFO(motion);
+    REQUIRE_FALSE(r.ok());
+    REQUIRE(r.diagnostics().size() == 1);
+    CHECK(r.diagnostics().front().code == "NC316");
+    CHECK(r.diagnostics().front().where.line == 5);
+  }
+}
+
+TEST_CASE("interpret: the tool's centre under cutter radius compensation", "[postproc][pipeline]") {
+  const auto r =
+      interpret_nc("%\nG21 G90 F600\nG0 X0 Y0 Z0\nG41.1 D4\nG1 X10\nY10\nG40\nG0 X0\nM30\n%\n", {});
+  REQUIRE(r.ok());
+  CHECK(has_code(r.diagnostics(), "NC265"));
+  const auto& points = r.value().path.points;
+  REQUIRE(points.size() == 4);
+  CHECK((points[1].location.tip - Vec3(8, 2, 0)).norm() < 1e-9);
+  CHECK((points[2].location.tip - Vec3(8, 10, 0)).norm() < 1e-9);
+  CHECK((points[3].location.tip - Vec3(0, 10, 0)).norm() < 1e-9);
+}
+
 TEST_CASE("interpret: G49 after G43, G53 and an unknown start", "[postproc][pipeline]") {
   const auto settings = posted_for("table_table_ac");
   const auto unknown =
