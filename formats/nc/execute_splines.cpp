@@ -31,6 +31,7 @@ void Executor::spline(const BlockWords& block, const BlockPlan& plan, GCode befo
   if ((coordinates_.unknown() & kXy) != 0) {
     return refuse("its start is not known: the program has not given X and Y; move there before");
   }
+  if (modal_.per_turn) return refuse("no feed by the turn (G95); write G94 before");
   if (plan.motion == 52) return add_control_point(block, plan);
   if (!feed_given(block, plan)) return;
 
@@ -87,8 +88,7 @@ void Executor::add_control_point(const BlockWords& block, const BlockPlan& plan)
   const double weight = block.has('P') ? block['P'] : 1.0;
   if (!(weight > 0.0)) return refuse("P, the weight of a point, is not above 0");
   if (modal_.incremental) return refuse("no incremental words; write G90");
-  if (modal_.inverse_time || modal_.per_turn)
-    return refuse("no inverse time and no feed by the turn; write G94");
+  if (modal_.inverse_time) return refuse("no inverse time; write G94");
   const bool first = control_points_.empty();
   if (first) {
     const double order = block.has('L') ? block['L'] : 3.0;

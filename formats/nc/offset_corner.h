@@ -48,7 +48,7 @@ inline bool is_tool_inside(const OffsetCurve& arc, const ToolSide& tool) {
 /// else. For b within e of π, a turn on the spot, the tool goes round, but inside when the arc
 /// that begins there has the tool outside of it, or, before a line, when the arc that ends there
 /// has.
-/// Tests "radius: corners ...", "radius against rs274 ...".
+/// Tests "corner: ...", "radius against rs274 ...".
 Corner corner_between(const OffsetCurve& before, const OffsetCurve& next, const ToolSide& tool);
 
 /// Where the curves of an inside corner meet; nothing: they do not. Of two points a line behind an
