@@ -182,7 +182,7 @@ LetterMask BlockPlanner::letters_of_g_codes(const BlockWords& block) const {
   LetterMask used = 0;
   const GCode mode0 = block.code(GGroup::non_modal);
   if (is_arc(plan_.motion)) used |= letter_bit('P') | letter_bit('R');
-  if (plan_.motion > 30 && plan_.motion != kPointArc) used |= letters_of_motion(block);
+  if (plan_.motion > 30 && !is_named_motion(plan_.motion)) used |= letters_of_motion(block);
   if (mode0 == 40) used |= letter_bit('P');
   if (mode0 == 100) used |= letter_bit('L') | letter_bit('P') | letter_bit('R');
   if (sets_tool_data(block)) used |= letter_bit('Q');
@@ -366,6 +366,7 @@ void BlockPlanner::plan_m(const BlockWords& block, int slot, LetterMask& free) {
   const bool siemens = dialect_ == InputDialect::siemens;
   if (action.m == 2 || action.m == 30 || (siemens && action.m == 17)) {
     action.kind = ProcessAction::Kind::program_end;
+    if (siemens) action.rank = kAfterMotion + 1;
     return add_action(action);
   }
   if (is_flow_m(action.m, dialect_)) {

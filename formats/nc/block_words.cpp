@@ -183,7 +183,11 @@ void BlockReader::add_statement(const Piece& piece, std::uint32_t index) {
   block_.words = true;
   const auto word = static_cast<SiemensWord>(piece.detail);
   if (word == SiemensWord::no_effect) return;
-  if (word == SiemensWord::declaration) return assign(index);
+  if (word == SiemensWord::program_name) return;
+  if (word == SiemensWord::declaration || word == SiemensWord::procedure ||
+      word == SiemensWord::further_procedure) {
+    return assign(index);
+  }
   block_.statements |= 1u << static_cast<unsigned>(word);
   block_.statement_piece = index;
 }

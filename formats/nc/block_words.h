@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "formats/nc/codes.h"
@@ -14,6 +15,7 @@ namespace smoothpost::nc {
 
 struct InterpreterSettings;
 class ParameterStore;
+struct CallScope;
 
 /// A set of word letters: bit 0 is A, bit 25 is Z, then the addresses of more than one letter.
 using LetterMask = std::uint64_t;
@@ -21,7 +23,7 @@ using LetterMask = std::uint64_t;
 constexpr int letter_index(char letter) { return letter - 'A'; }
 constexpr LetterMask letter_bit(char letter) { return LetterMask{1} << letter_index(letter); }
 
-inline constexpr int kAddresses = 36;
+inline constexpr int kAddresses = 42;
 
 /// The components of the tool axis.
 inline constexpr LetterMask kVectorMask =
@@ -94,8 +96,15 @@ class WordValues {
   virtual bool in_cycle() const { return false; }
   /// The value at the start of `text`, of a line of program flow.
   virtual Evaluated value(std::string_view) { return {}; }
-  /// The parameters; nullptr: the dialect has no calls.
+  /// The parameters; nullptr: those of Sinumerik programs.
   virtual ParameterStore* store() { return nullptr; }
+  /// A subprogram begins, and ends.
+  virtual void enter_call(const CallScope& scope) = 0;
+  virtual void leave_call() = 0;
+  /// siemens: what the variable holds is not certain until it is assigned again.
+  virtual void forget(const std::string&) {}
+  /// siemens: the text of MSG( ); nothing: it is no text.
+  virtual std::optional<std::string> text(std::string_view) { return std::nullopt; }
 };
 
 /// Sorts the pieces of blocks into BlockWords and refuses what no block may hold: unknown and

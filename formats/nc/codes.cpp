@@ -183,8 +183,8 @@ constexpr Row kSiemensRows[] = {
     {550, GGroup::work_system, kRead, "work system 2"},
     {560, GGroup::work_system, kRead, "work system 3"},
     {570, GGroup::work_system, kRead, "work system 4"},
-    {580, GGroup::non_modal, kLater, "shift of single axes"},
-    {590, GGroup::non_modal, kLater, "shift of single axes"},
+    {580, GGroup::non_modal, kRead, "shift of single axes"},
+    {590, GGroup::non_modal, kRead, "further shift of single axes"},
     {600, GGroup::path_control, kRead, "exact stop"},
     {620, GGroup::no_effect, kRead, "corner override"},
     {630, GGroup::motion, kLater, "tapping"},
@@ -200,9 +200,9 @@ constexpr Row kSiemensRows[] = {
     {950, GGroup::feed_mode, kLater, "feed by the turn"},
     {960, GGroup::spindle_mode, kLater, "constant surface speed"},
     {970, GGroup::spindle_mode, kRead, "spindle speed"},
-    {1100, GGroup::non_modal, kLater, "pole"},
-    {1110, GGroup::non_modal, kLater, "pole"},
-    {1120, GGroup::non_modal, kLater, "pole"},
+    {1100, GGroup::non_modal, kRead, "pole from the present position"},
+    {1110, GGroup::non_modal, kRead, "pole from the zero"},
+    {1120, GGroup::non_modal, kRead, "pole from the last pole"},
     {1530, GGroup::non_modal, kRead, "machine coordinates"},
     {3310, GGroup::motion, kLater, "tapping"},
     {3320, GGroup::motion, kLater, "tapping"},
@@ -219,6 +219,8 @@ constexpr Row kSiemensRows[] = {
     {6450, GGroup::path_control, kRead, "path blending"},
     {7000, GGroup::units, kRead, "inch, feed too"},
     {7100, GGroup::units, kRead, "millimetre, feed too"},
+    {kPolynomial, GGroup::motion, kExpanded, "polynomial"},
+    {kTangentArc, GGroup::motion, kRead, "tangential arc"},
     {kPointArc, GGroup::motion, kRead, "arc through a point"},
 };
 
@@ -259,6 +261,8 @@ const GCodeInfo& g_code_info(GCode code, InputDialect dialect) {
 
 std::string g_code_text(GCode code) {
   if (code == kPointArc) return "CIP";
+  if (code == kTangentArc) return "CT";
+  if (code == kPolynomial) return "POLY";
   std::string text = "G" + std::to_string(code / 10);
   if (code % 10 != 0) text += "." + std::to_string(code % 10);
   return text;

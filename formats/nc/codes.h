@@ -13,7 +13,13 @@ inline constexpr GCode kNoCode = -1;
 
 inline constexpr GCode kSplineEnd = 53;   ///< G5.3
 inline constexpr GCode kMacroCall = 650;  ///< G65 of the Fanuc family
-inline constexpr GCode kPointArc = 9999;  ///< CIP of siemens, which has no number
+
+// Motions of siemens that have no number.
+inline constexpr GCode kPolynomial = 9997;  ///< POLY
+inline constexpr GCode kTangentArc = 9998;  ///< CT
+inline constexpr GCode kPointArc = 9999;    ///< CIP
+/// Above any number that a G word of siemens may have.
+inline constexpr double kMostSiemensCode = 999.6;
 
 /// Rank of m_rank() for what acts after the motion of its line.
 inline constexpr int kAfterMotion = 7;
@@ -80,6 +86,8 @@ inline bool is_cycle(GCode code) {
 }
 /// G33, G33.1, G76.
 inline bool is_synchronised(GCode code) { return code == 330 || code == 331 || code == 760; }
+/// CIP, CT, POLY.
+inline bool is_named_motion(GCode code) { return code >= kPolynomial; }
 /// G5, G5.1, G5.2.
 inline bool is_spline(GCode code) { return code >= 50 && code <= 52; }
 

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "formats/nc/plane.h"
+
 namespace smoothpost::nc {
 namespace {
 
@@ -53,7 +55,7 @@ AxisWords Coordinates::program_from_world(const AxisWords& world) const {
     program[1] = -sine_ * x + cosine_ * program[1];
   }
   for (std::size_t i = 0; i < program.size(); ++i) program[i] -= frame_shift_[i] + shift_[i];
-  if (framed_) turn(frame_rotation_.transpose(), program);
+  if (framed_) turn(frame_inverse_, program);
   return program;
 }
 
@@ -66,6 +68,12 @@ Vec3 Coordinates::world_from_program(const Vec3& program) const {
 
 Vec3 Coordinates::world_direction(const Vec3& direction) const {
   return plane_turned(framed_ ? Vec3(frame_rotation_ * direction) : direction);
+}
+
+Vec3 Coordinates::world_normal(const Vec3& normal) const {
+  if (rigid_) return world_direction(normal);
+  const Vec3 turned = frame_rotation_.determinant() * (frame_inverse_.transpose() * normal);
+  return plane_turned(turned.normalized());
 }
 
 Vec3 Coordinates::plane_turned(const Vec3& direction) const {
@@ -101,9 +109,29 @@ void Coordinates::set_frame(const Mat3& rotation, const AxisWords& shift) {
   frame_rotation_ = rotation;
   frame_shift_ = shift;
   framed_ = !rotation.isIdentity(0.0);
+  constexpr double kUnitary = 1e-9;
+  const bool unitary = rotation.isUnitary(kUnitary);
+  rigid_ = unitary && rotation.determinant() > 0.0;
+  frame_inverse_ = unitary ? Mat3(rotation.transpose()) : Mat3(rotation.inverse());
   refresh();
 }
 
 void Coordinates::set_shift(const AxisWords& shift) { shift_ = shift; }
+
+std::optional<PlaneScale> plane_scale(const Coordinates& coordinates, int plane_code) {
+  if (coordinates.rigid()) return PlaneScale{};
+  const PlaneAxes plane = plane_axes(static_cast<GCode>(plane_code));
+  const Mat3& frame = coordinates.frame_rotation();
+  const Vec3 a = frame.col(static_cast<Eigen::Index>(plane.first));
+  const Vec3 b = frame.col(static_cast<Eigen::Index>(plane.second));
+  const Vec3 c = frame.col(static_cast<Eigen::Index>(plane.third));
+  constexpr double kSame = 1e-9;
+  const auto crosses = [&](const Vec3& u, const Vec3& v) {
+    return std::abs(u.dot(v)) <= kSame * u.norm() * v.norm();
+  };
+  if (std::abs(a.norm() - b.norm()) > kSame * a.norm()) return std::nullopt;
+  if (!crosses(a, b) || !crosses(a, c) || !crosses(b, c)) return std::nullopt;
+  return PlaneScale{a.norm(), c.norm()};
+}
 
 }  // namespace smoothpost::nc

@@ -80,7 +80,12 @@ bool Executor::enter(ProgramUnit& unit, CallFrame frame) {
   }
   unit_ = &unit;
   place_.next = frame.entry;
-  values_->store()->enter(frame.scope);
+  frame.caller_begin = range_begin_;
+  frame.caller_end = range_end_;
+  const bool part = frame.style == CallFrame::Style::part;
+  run_within(part || is_siemens() ? frame.entry : 0,
+             frame.end != 0 ? frame.end : unit.program->blocks.size());
+  if (!part) values_->enter_call(frame.scope);
   frames_.push_back(std::move(frame));
   place_.call_level = static_cast<int>(frames_.size()) - 1;
   reader_.select(*unit.program, input_line_);
@@ -90,12 +95,14 @@ bool Executor::enter(ProgramUnit& unit, CallFrame frame) {
 
 void Executor::leave_call() {
   CallFrame& frame = frames_.back();
-  values_->store()->leave();
+  const bool part = frame.style == CallFrame::Style::part;
+  if (!part) values_->leave_call();
   if (--frame.repeats_left > 0) {
-    values_->store()->enter(frame.scope);
+    if (!part) values_->enter_call(frame.scope);
     place_.next = frame.entry;
     return;
   }
+  run_within(frame.caller_begin, frame.caller_end);
   unit_ = frame.caller;
   input_line_ = frame.caller_input_line;
   place_.next = frame.return_block;
@@ -105,9 +112,33 @@ void Executor::leave_call() {
   log_.enter_file(unit_->program->file_name);
 }
 
+void Executor::run_within(std::size_t begin, std::size_t end) {
+  range_begin_ = begin;
+  range_end_ = end;
+}
+
+/// The next block is not one of those that are run. True: the run goes on.
+bool Executor::leave_range() {
+  if (frames_.back().style == CallFrame::Style::part) {
+    if (place_.next == range_end_) {
+      leave_call();
+      return true;
+    }
+    stop("NC250",
+         "the flow leaves the part that REPEAT runs again: where it would go on is not "
+         "stated; end the loop or branch within the part",
+         frames_.back().place);
+    return false;
+  }
+  if (frames_.size() > 1) end_of_text();
+  return false;
+}
+
 void Executor::end_of_text() {
-  const TextPlace place{static_cast<std::uint32_t>(unit_->program->blocks.size()), 1};
-  const char* end = frames_.back().style == CallFrame::Style::oword ? "endsub" : "M99";
+  const TextPlace place{static_cast<std::uint32_t>(range_end_), 1};
+  const char* end = is_siemens()                                      ? "M17 or RET"
+                    : frames_.back().style == CallFrame::Style::oword ? "endsub"
+                                                                      : "M99";
   stop("NC257", std::string("the text ends within a subroutine: ") + end + " is missing", place);
 }
 

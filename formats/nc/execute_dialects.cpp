@@ -4,8 +4,7 @@
 #include "formats/nc/number_text.h"
 #include "kernels/core/units.h"
 
-// What Sinumerik and the Fanuc family have and RS274NGC has not: frames, tool edges, tool axes by
-// vector.
+// What Sinumerik and the Fanuc family have and RS274NGC has not: tool edges, tool axes by vector.
 namespace smoothpost::nc {
 namespace {
 
@@ -15,20 +14,19 @@ constexpr AxisMask kRotaryAxes = 0x38;
 constexpr unsigned kWarnCycle832 = 0, kWarnSwivel = 1, kWarnHighSpeed = 2, kWarnLength = 3,
                    kWarnAxes = 4, kWarnGreatCircle = 5;
 
-AxisMask bit(std::size_t axis) { return static_cast<AxisMask>(1u << axis); }
-
-Mat3 turn_about(const Vec3& axis, double degrees) {
-  return Eigen::AngleAxisd(radians_from_degrees(degrees), axis).toRotationMatrix();
+/// What stands between the parentheses of MSG(..), and its first quoted text.
+std::string_view inside(std::string_view statement) {
+  const std::size_t open = statement.find('(');
+  return statement.substr(open + 1, statement.size() - open - 2);
 }
 
-/// The text of MSG("..."), or what stands between its parentheses.
 std::string_view message_text(std::string_view statement) {
   const std::size_t open = statement.find('(');
   const std::size_t quote = statement.find('"', open);
   const std::size_t close =
       quote == std::string_view::npos ? quote : statement.find('"', quote + 1);
   if (close != std::string_view::npos) return statement.substr(quote + 1, close - quote - 1);
-  return statement.substr(open + 1, statement.size() - open - 2);
+  return inside(statement);
 }
 
 }  // namespace
@@ -49,7 +47,8 @@ void Executor::warn_dialect(const BlockWords& block) {
 /// What the statements of a Sinumerik block do before its motion.
 void Executor::statements(const BlockWords& block) {
   if (block.says(SiemensWord::message)) {
-    message(message_text(reader_.raw(block.statement_piece)), block.input_line,
+    const std::string_view text = reader_.raw(block.statement_piece);
+    message(values_->text(inside(text)).value_or(std::string(message_text(text))), block.input_line,
             reader_.input_place(block, block.statement_piece).column);
   }
   if (block.says(SiemensWord::cycle832)) {
@@ -58,7 +57,10 @@ void Executor::statements(const BlockWords& block) {
               "of the machine file and the command line",
               block, block.statement_piece);
   }
-  if (block.says(SiemensWord::no_swivel)) {
+  if (block.says(SiemensWord::swivel)) swivel(block);
+  if (block.says(SiemensWord::no_swivel) && modal_.swivelled) {
+    leave_plane();
+  } else if (block.says(SiemensWord::no_swivel)) {
     warn_once(kWarnSwivel,
               "CYCLE800() ends a swivelled plane; none is active, it does nothing here", block,
               block.statement_piece);
@@ -69,60 +71,17 @@ void Executor::statements(const BlockWords& block) {
   if (block.says(SiemensWord::oriaxes)) modal_.great_circle = false;
   if (block.says(SiemensWord::oriaxes)) modal_.linear_axes = true;
   if (block.says(SiemensWord::orivect)) modal_.linear_axes = false;
+  if (block.says(SiemensWord::orieuler)) modal_.axis_angles = AxisAngles::euler;
+  if (block.says(SiemensWord::orirpy)) modal_.axis_angles = AxisAngles::roll_pitch_yaw;
+  if (block.says(SiemensWord::oriother)) modal_.axis_angles = AxisAngles::none;
+  if (block.says(SiemensWord::traori) && modal_.swivelled) {
+    log_.error("NC245", "TRAORI in the plane of CYCLE800 is not read; write CYCLE800() before",
+               reader_.place(block, block.statement_piece));
+  }
   if (block.says(SiemensWord::traori)) set_tcp(true);
   if (block.says(SiemensWord::trafoof)) set_tcp(false);
-  if (block.says(SiemensWord::program_end)) {
-    sink_.program_end(block.input_line);
-    summary_.ended = true;
-  }
+  if (block.says(SiemensWord::offset_data)) take_offset_data(block);
   change_frame(block);
-}
-
-/// R of ROT and AROT: RPL turns about the normal of the plane; else Z, then the new Y, then the new
-/// X.
-Mat3 Executor::frame_turn(const BlockWords& block) const {
-  if (block.has(kPlaneAngle)) {
-    const Vec3 normal = modal_.plane == 180   ? Vec3(Vec3::UnitY())
-                        : modal_.plane == 190 ? Vec3(Vec3::UnitX())
-                                              : Vec3(Vec3::UnitZ());
-    return turn_about(normal, block[kPlaneAngle]);
-  }
-  const auto angle = [&](char letter) { return block.has(letter) ? block[letter] : 0.0; };
-  return turn_about(Vec3::UnitZ(), angle('Z')) * turn_about(Vec3::UnitY(), angle('Y')) *
-         turn_about(Vec3::UnitX(), angle('X'));
-}
-
-/// TRANS and ROT replace the frame, ATRANS and AROT go on from it: p' = R·p + t.
-void Executor::change_frame(const BlockWords& block) {
-  const bool shifts = block.says(SiemensWord::trans) || block.says(SiemensWord::atrans);
-  const bool turns = block.says(SiemensWord::rot) || block.says(SiemensWord::arot);
-  if (!shifts && !turns) return;
-  const AxisWords here = coordinates_.world();
-  const AxisMask unknown = coordinates_.unknown();
-  Mat3 rotation = coordinates_.frame_rotation();
-  AxisWords shift = coordinates_.frame_shift();
-  if (block.says(SiemensWord::trans) || block.says(SiemensWord::rot)) {
-    rotation = Mat3::Identity();
-    shift = {};
-  }
-  if (turns) rotation = rotation * frame_turn(block);
-  if (shifts) {
-    const AxisMask axes = axis_mask(block.letters);
-    Vec3 linear = Vec3::Zero();
-    for (std::size_t i = 0; i < shift.size(); ++i) {
-      if ((axes & bit(i)) == 0) continue;
-      if (i < 3) {
-        linear[static_cast<Eigen::Index>(i)] = word_value(block, i);
-      } else {
-        shift[i] += word_value(block, i);
-      }
-    }
-    const Vec3 moved = rotation * linear;
-    for (std::size_t i = 0; i < 3; ++i) shift[i] += moved[static_cast<Eigen::Index>(i)];
-  }
-  coordinates_.set_frame(rotation, shift);
-  coordinates_.move_to(here, unknown);
-  offset_dirty_ = true;
 }
 
 void Executor::change_tool(const BlockWords& block) {
@@ -163,6 +122,12 @@ void Executor::set_tcp_by_offset(GCode code) {
 
 /// The tool axis at both ends of a motion in tool-centre-point mode.
 void Executor::turn_axis(const BlockWords& block, const BlockPlan& plan) {
+  if (!coordinates_.rigid() && (plan.vector != 0 || (plan.axes & kRotaryAxes) != 0)) {
+    log_.error("NC245",
+               "a tool axis under MIRROR or SCALE: what the control makes of it is not stated; let "
+               "the CAM post write it without them",
+               at(block, GGroup::motion));
+  }
   if (plan.vector != 0) {
     constexpr char kSiemens[] = {kAxisVectorX, kAxisVectorY, kAxisVectorZ};
     constexpr char kFanuc[] = {'I', 'J', 'K'};

@@ -64,10 +64,17 @@ void Executor::flow(const BlockWords& block) {
     case Kind::macro_if_then:
       return macro(statement);
     case Kind::label_goto:
-      return go_to_label(statement);
     case Kind::label_if_goto:
-      if (holds(statement) && !stopped_) go_to_label(statement);
-      return;
+    case Kind::label_case:
+    case Kind::counted_for:
+    case Kind::endfor:
+    case Kind::endless_loop:
+    case Kind::endloop:
+    case Kind::repeat_until:
+    case Kind::until:
+    case Kind::repeat_part:
+    case Kind::program_call:
+      return siemens_flow(statement, number);
     default:
       return loop(statement, number);
   }

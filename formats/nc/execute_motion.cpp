@@ -89,7 +89,7 @@ AxisMask Executor::unknown_at_target(const BlockWords& block, AxisMask axes) con
 
 void Executor::begin_motion(const BlockWords& block, const BlockPlan& plan) {
   motion_.is_arc = false;
-  motion_.tcp = modal_.tcp;
+  motion_.tcp = modal_.tcp || modal_.swivelled;
   motion_.machine_position = false;
   motion_.unknown_start = coordinates_.unknown();
   motion_.programmed = plan.axes;
@@ -98,8 +98,9 @@ void Executor::begin_motion(const BlockWords& block, const BlockPlan& plan) {
   motion_.pitch = 0.0;
   motion_.start = coordinates_.world();
   motion_.column = reader_.input_place(block, block.first_piece).column;
-  motion_.axis_vector = false;
-  summary_.uses_tcp = summary_.uses_tcp || modal_.tcp;
+  motion_.axis_vector = modal_.swivelled;
+  if (modal_.swivelled) motion_.start_axis = motion_.end_axis = modal_.axis;
+  summary_.uses_tcp = summary_.uses_tcp || motion_.tcp;
   summary_.uses_rotary = summary_.uses_rotary || (plan.axes & kRotaryAxes) != 0;
 }
 
@@ -107,6 +108,10 @@ void Executor::finish_motion() {
   if (offset_dirty_) announce_offset(motion_.line);
   const bool by_turn = modal_.per_turn && motion_.kind == MotionKind::feed;
   if (by_turn && motion_.pitch == 0.0) motion_.pitch = modal_.linear_feed;
+  if (modal_.swivelled && motion_.axis_vector) {
+    motion_.unknown_start = static_cast<AxisMask>(motion_.unknown_start & ~kRotaryAxes);
+    motion_.unknown_end = static_cast<AxisMask>(motion_.unknown_end & ~kRotaryAxes);
+  }
   sink_.motion(motion_);
   coordinates_.move_to(motion_.end, motion_.unknown_end);
   // Where the rotary axes are is the machine's affair then.
@@ -180,18 +185,28 @@ void Executor::motion(const BlockWords& block, const BlockPlan& plan) {
   const GCode mode = block.code(GGroup::motion);
   const GCode before = modal_.motion;
   if (mode != kNoCode) change_mode(mode, block);
-  if (plan.motion > 30 && plan.motion != kPointArc) return expanded_motion(block, plan, before);
+  if (plan.motion > 30 && !is_named_motion(plan.motion)) {
+    return expanded_motion(block, plan, before);
+  }
   if (plan.motion == kNoCode || plan.motion == kRefusedMotion) return;
+  if (modal_.swivelled && ((plan.axes & kRotaryAxes) != 0 || plan.vector != 0)) {
+    log_.error(
+        "NC245",
+        "rotary words or a tool axis in the plane of CYCLE800: the tool would leave it; write "
+        "CYCLE800() before",
+        at(block, GGroup::motion));
+    return;
+  }
   const bool feeds = plan.motion != 0;
   const bool arc_motion = plan.motion == 20 || plan.motion == 30;
   if (feeds && !feed_given(block, plan)) {
     coordinates_.move_to(target(block, plan.axes), unknown_at_target(block, plan.axes));
     return;
   }
-  if (plan.motion == kPointArc) {
-    point_arc(block, plan);
-  } else if (arc_motion) {
+  if (arc_motion) {
     arc(block, plan);
+  } else if (is_named_motion(plan.motion)) {
+    named_motion(block, plan);
   } else if (plan.axes != 0 || plan.vector != 0) {
     straight(block, plan);
   }
@@ -203,6 +218,7 @@ void Executor::straight(const BlockWords& block, const BlockPlan& plan) {
   const GCode code = block.code(GGroup::non_modal);
   if (code == 530 || code == 1530 || block.says(SiemensWord::supa)) {
     motion_.machine_position = true;
+    if (modal_.swivelled) motion_.tcp = motion_.axis_vector = false;
     motion_.end = machine_target(block, plan.axes);
     motion_.unknown_end = static_cast<AxisMask>(coordinates_.unknown() & ~plan.axes);
   } else {
@@ -214,6 +230,55 @@ void Executor::straight(const BlockWords& block, const BlockPlan& plan) {
     motion_.duration = duration_of(motion_, length(motion_.start, motion_.end, 0), block);
   }
   finish_motion();
+  // Where it stands in the plane is the machine's affair then.
+  if (motion_.machine_position && modal_.swivelled) coordinates_.forget(kRotaryAxes | 7);
+}
+
+/// What is wrong with the words of a G2 or G3 block; empty: nothing.
+std::string Executor::arc_form(const BlockWords& block, const BlockPlan& plan) const {
+  const PlaneAxes plane = plane_axes(modal_.plane);
+  // Under G43.5 I J K are refused on arcs, so they are centres here.
+  const bool centre_form = block.has('I') || block.has('J') || block.has('K');
+  const char radius = is_siemens() ? kCircleRadius : 'R';
+  const bool in_plane = (plan.axes & (bit(plane.first) | bit(plane.second))) != 0;
+  if (block.has(radius) && centre_form) {
+    return "both " + address_text(radius) + " and I J K are given";
+  }
+  if (block.has(plane.wrong_centre)) {
+    return std::string(1, plane.wrong_centre) + " has no meaning in the plane " + plane.name;
+  }
+  if (is_siemens() && block.has(kArcAngle)) {
+    if (!(block[kArcAngle] > 0.0) || block[kArcAngle] >= 360.0) {
+      return "AR, the angle of the arc, is above 0 and below 360 degrees";
+    }
+    if (block.has(radius) || block.has(kCircleTurns)) return "AR stands without CR and TURN";
+    if (centre_form == in_plane) return "AR needs the end or the centre, not both";
+    return {};
+  }
+  if (!block.has(radius) && !centre_form) {
+    return "neither " + address_text(radius) + " nor I J K is given";
+  }
+  if (centre_form && modal_.arc_absolute &&
+      !(block.has(plane.first_centre) && block.has(plane.second_centre))) {
+    return std::string("absolute centres (G90.1) need both ") + plane.first_centre + " and " +
+           plane.second_centre;
+  }
+  if (!centre_form && !in_plane) {
+    return std::string("an arc by radius needs an end in the plane ") + plane.name;
+  }
+  return {};
+}
+
+/// The centre that I J K say, in program coordinates.
+PlanePoint Executor::arc_centre(const BlockWords& block, const ArcWords& words) const {
+  const PlaneAxes plane = plane_axes(modal_.plane);
+  const auto component = [&](char letter, double start) {
+    const bool absolute = modal_.arc_absolute || (block.absolute & letter_bit(letter)) != 0;
+    const double value = block.has(letter) ? block[letter] * modal_.unit : 0.0;
+    return value + (absolute ? 0.0 : start);
+  };
+  return {component(plane.first_centre, words.start.first),
+          component(plane.second_centre, words.start.second)};
 }
 
 void Executor::arc(const BlockWords& block, const BlockPlan& plan) {
@@ -227,31 +292,13 @@ void Executor::arc(const BlockWords& block, const BlockPlan& plan) {
   const AxisWords start = coordinates_.program_from_world(motion_.start);
   const AxisWords end = coordinates_.program_from_world(motion_.end);
   if (!is_linuxcnc() && modal_.tcp) turn_axis(block, plan);
-  // Under G43.5 I J K are refused on arcs, so they are centres here.
-  const bool centre_form = block.has('I') || block.has('J') || block.has('K');
-  const char radius = is_siemens() ? kCircleRadius : 'R';
-
-  std::string problem;
-  if (block.has(radius) && centre_form) {
-    problem = "both " + address_text(radius) + " and I J K are given";
-  } else if (!block.has(radius) && !centre_form) {
-    problem = "neither " + address_text(radius) + " nor I J K is given";
-  } else if (block.has(plane.wrong_centre)) {
-    problem = std::string(1, plane.wrong_centre) + " has no meaning in the plane " + plane.name;
-  } else if (centre_form && modal_.arc_absolute &&
-             !(block.has(plane.first_centre) && block.has(plane.second_centre))) {
-    problem = std::string("absolute centres (G90.1) need both ") + plane.first_centre + " and " +
-              plane.second_centre;
-  } else if (!centre_form && (plan.axes & (bit(plane.first) | bit(plane.second))) == 0) {
-    problem = std::string("an arc by radius needs an end in the plane ") + plane.name;
-  }
+  const std::string problem = arc_form(block, plan);
   if (!problem.empty()) {
     log_.error("NC220", code + ": " + problem + "; let the CAM post write one centre form",
                at(block, GGroup::motion));
     coordinates_.move_to(motion_.end, motion_.unknown_end);
     return;
   }
-
   ArcWords words;
   words.start = {start[plane.first], start[plane.second]};
   words.end = {end[plane.first], end[plane.second]};
@@ -261,35 +308,48 @@ void Executor::arc(const BlockWords& block, const BlockPlan& plan) {
   words.centre_tolerance = modal_.unit == 1.0 ? kCentreToleranceMillimetre : kCentreToleranceInch;
   if (is_siemens()) words.centre_tolerance = kCentreToleranceSiemens;
   words.radius_tolerance = kRadiusTolerance;
+  const char radius = is_siemens() ? kCircleRadius : 'R';
   PlaneArc found;
-  if (centre_form) {
-    const double i = block.has(plane.first_centre) ? block[plane.first_centre] * modal_.unit : 0.0;
-    const double j =
-        block.has(plane.second_centre) ? block[plane.second_centre] * modal_.unit : 0.0;
-    const auto is_absolute = [&](char letter) {
-      return modal_.arc_absolute || (block.absolute & letter_bit(letter)) != 0;
-    };
-    found =
-        arc_by_centre(words, {i + (is_absolute(plane.first_centre) ? 0.0 : words.start.first),
-                              j + (is_absolute(plane.second_centre) ? 0.0 : words.start.second)});
-  } else {
+  if (is_siemens() && block.has(kArcAngle)) {
+    found = arc_by_angle(block, words);
+  } else if (block.has(radius)) {
     found = arc_by_radius(words, block[radius] * modal_.unit);
+  } else {
+    found = arc_by_centre(words, arc_centre(block, words));
   }
   if (!found.problem.empty()) {
     log_.error("NC221", code + ": " + found.problem, at(block, GGroup::motion));
     coordinates_.move_to(motion_.end, motion_.unknown_end);
     return;
   }
+  finish_arc(block, found);
+}
+
+/// Hands on an arc of the plane from the motion's start to its end.
+void Executor::finish_arc(const BlockWords& block, const PlaneArc& found) {
+  const PlaneAxes plane = plane_axes(modal_.plane);
+  const AxisWords start = coordinates_.program_from_world(motion_.start);
+  const AxisWords end = coordinates_.program_from_world(motion_.end);
   Vec3 centre(start[0], start[1], start[2]);
   centre[static_cast<Eigen::Index>(plane.first)] = found.centre.first;
   centre[static_cast<Eigen::Index>(plane.second)] = found.centre.second;
   Vec3 normal = Vec3::Zero();
   normal[static_cast<Eigen::Index>(plane.third)] = 1.0;
+  const std::optional<PlaneScale> scale = plane_scale(coordinates_, modal_.plane);
+  if (!scale) {
+    log_.error("NC245",
+               "an arc whose plane the frame stretches unequally or bends is no arc any more; let "
+               "the CAM post write without SCALE",
+               at(block, GGroup::motion));
+    coordinates_.move_to(motion_.end, motion_.unknown_end);
+    return;
+  }
   motion_.arc.centre = coordinates_.world_from_program(centre);
-  motion_.arc.normal = coordinates_.world_direction(normal);
+  motion_.arc.normal = coordinates_.world_normal(normal);
   motion_.arc.sweep = found.sweep;
-  const double climb = end[plane.third] - start[plane.third];
-  motion_.duration = duration_of(motion_, std::hypot(found.radius * found.sweep, climb), block);
+  const double climb = scale->along * (end[plane.third] - start[plane.third]);
+  const double round = scale->within * found.radius * found.sweep;
+  motion_.duration = duration_of(motion_, std::hypot(round, climb), block);
   finish_motion();
 }
 

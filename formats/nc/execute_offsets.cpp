@@ -20,8 +20,21 @@ int system_of(GCode code) {
 
 void Executor::work_system(const BlockWords& block) {
   const int system = system_of(block.code(GGroup::work_system));
+  const auto pending = pending_offsets_.find(system);
+  if (modal_.swivelled && (system != coordinates_.system() || pending != pending_offsets_.end())) {
+    log_.error("NC245",
+               "another work system in the plane of CYCLE800 is not read; write CYCLE800() before",
+               at(block, GGroup::work_system));
+    return;
+  }
+  if (pending != pending_offsets_.end()) {
+    coordinates_.set_offset(system, pending->second);
+    pending_offsets_.erase(pending);
+    offset_dirty_ = true;
+  }
   if (system == coordinates_.system()) return;
   coordinates_.select_system(system);
+  modal_.polar.lost = modal_.polar.set;
   offset_dirty_ = true;
 }
 
@@ -54,6 +67,13 @@ void Executor::non_modal(const BlockWords& block, const BlockPlan& plan) {
     case 922:
     case 923:
       return shift_zero(block, plan);
+    case 580:
+    case 590:
+      return shift_axes(block, plan);
+    case 1100:
+    case 1110:
+    case 1120:
+      return set_pole(block, plan);
     default:
       return;  // G4 and G53 act elsewhere
   }

@@ -112,6 +112,10 @@ void Executor::process(const BlockWords& block, const BlockPlan& plan, bool afte
         flow_word(block, action);
         break;
       case ProcessAction::Kind::program_end:
+        if (is_siemens()) {
+          end_siemens_program(block.input_line);
+          break;
+        }
         sink_.program_end(block.input_line);
         summary_.ended = true;
         break;

@@ -150,7 +150,8 @@ void Executor::follow_curves(const BlockWords& block, const BlockPlan& plan,
     begin_motion(block, plan);
     motion_.kind = MotionKind::feed;
     motion_.end = motion_.start;
-    for (std::size_t i = 0; i < 2; ++i) motion_.end[i] = point[static_cast<Eigen::Index>(i)];
+    const std::size_t axes = is_siemens() ? 3 : 2;
+    for (std::size_t i = 0; i < axes; ++i) motion_.end[i] = point[static_cast<Eigen::Index>(i)];
     motion_.unknown_end = coordinates_.unknown();
     const double part = (point - xyz(motion_.start)).norm();
     if (modal_.inverse_time) {

@@ -58,6 +58,8 @@ void Executor::set_tool_length(double length, int tool, std::uint32_t line) {
   offset[kZ] = length;
   const bool same = offset == coordinates_.tool() && tool == modal_.length_tool;
   coordinates_.set_tool(offset);
+  constexpr AxisMask kLinear = 7;
+  if (!same && modal_.swivelled) coordinates_.forget(kLinear);
   modal_.length_tool = tool;
   if (!same) sink_.tool_length(length, tool, line);
 }

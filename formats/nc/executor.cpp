@@ -57,6 +57,7 @@ Executor::Executor(const Program& program, const InterpreterSettings& settings,
   units_.push_back(std::make_unique<ProgramUnit>());
   unit_ = units_.back().get();
   unit_->program = &program;
+  run_within(0, program.blocks.size());
   frames_.emplace_back();
   // What the program costs when every block runs once.
   constexpr std::uint64_t kMost = std::uint64_t{1} << 60;
@@ -67,6 +68,7 @@ Executor::Executor(const Program& program, const InterpreterSettings& settings,
 Result<InterpretationSummary> Executor::run() {
   const Program& program = *unit_->program;
   if (program.has_flow) tell_flow_faults(*unit_);
+  if (program.has_flow && is_siemens()) begin_siemens_program();
   while (run_block()) {
   }
   radius_.end();
@@ -96,10 +98,7 @@ Result<InterpretationSummary> Executor::run() {
 /// Runs the next block; false: there is none.
 bool Executor::run_block() {
   const Program& program = *unit_->program;
-  if (place_.next >= program.blocks.size()) {
-    if (frames_.size() > 1) end_of_text();
-    return false;
-  }
+  if (place_.next >= range_end_ || place_.next < range_begin_) return leave_range();
   const std::size_t index = place_.next++;
   if (skipped(index)) return true;
   const std::uint64_t cost = cost_of(program, program.blocks[index]);
@@ -160,6 +159,17 @@ void Executor::block(const BlockWords& block) {
     if (block.comment_piece != BlockWords::kNone) comment(block);
     return;
   }
+  constexpr LetterMask kRewritten = letter_bit(kPolarAngle) | letter_bit(kPolarRadius) |
+                                    letter_bit(kAxisAngleA) | letter_bit(kAxisAngleB) |
+                                    letter_bit(kAxisAngleC);
+  if (is_siemens() && ((block.letters & kRewritten) != 0 || block.statements != 0 ||
+                       modal_.motion == kPolynomial)) {
+    if (const auto own = rewritten(block)) return planned(*own);
+  }
+  planned(block);
+}
+
+void Executor::planned(const BlockWords& block) {
   if (planner_.plan(block, modal_)) {
     if (block.code(GGroup::non_modal) == kMacroCall) return macro_call(block);
     if (!control_points_.empty() && !may_stand_in_spline(block)) return;
@@ -199,7 +209,10 @@ void Executor::act(const BlockWords& block, const BlockPlan& plan) {
     if (block.says(SiemensWord::modal_call) || block.says(SiemensWord::single_call))
       define_drilling(block, plan);
   }
+  const std::size_t depth = frames_.size();
   process(block, plan, true);
+  const bool ended = summary_.ended || frames_.size() != depth;
+  if (block.says(SiemensWord::program_end) && !ended) end_siemens_program(block.input_line);
 }
 
 void Executor::set_feed_mode(const BlockWords& block) {
@@ -243,7 +256,10 @@ void Executor::set_units(const BlockWords& block) {
 
 void Executor::set_modes(const BlockWords& block) {
   const GCode plane = block.code(GGroup::plane);
-  if (plane != kNoCode) modal_.plane = plane;
+  if (plane != kNoCode && plane != modal_.plane) {
+    modal_.plane = plane;
+    modal_.polar.lost = modal_.polar.set;
+  }
   const GCode distance = block.code(GGroup::distance);
   if (distance != kNoCode) modal_.incremental = distance == 910;
   const GCode arc_distance = block.code(GGroup::arc_distance);
@@ -286,7 +302,10 @@ void Executor::recover(const BlockWords& block) {
   if (!is_linuxcnc() && offset != kNoCode) set_tcp_by_offset(offset);
   for (int i = 0; i < block.m_count; ++i) {
     const int m = block.m[static_cast<std::size_t>(i)];
-    if (m == 2 || m == 30 || (is_siemens() && m == 17)) summary_.ended = true;
+    if (is_siemens() && (m == 2 || m == 17 || m == 30)) {
+      return end_siemens_program(block.input_line);
+    }
+    if (m == 2 || m == 30) summary_.ended = true;
   }
 }
 
@@ -299,7 +318,9 @@ void Executor::note_text_after_end(std::size_t index) {
       const Piece& piece = program.pieces[block.first_piece + k];
       const PieceKind kind = piece.kind;
       const bool label = kind == PieceKind::word && piece.letter == 'O' && called_;
-      if (kind == PieceKind::flow || label) return;
+      const bool section = is_siemens() && kind == PieceKind::statement && called_ &&
+                           piece.detail >= static_cast<std::uint8_t>(SiemensWord::program_name);
+      if (kind == PieceKind::flow || label || section) return;
       if (kind == PieceKind::percent) return;
       if (kind != PieceKind::word && kind != PieceKind::construct) continue;
       log_.note("NC230", "the program has ended; the lines from here on are not read",

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <array>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
 
+#include "formats/nc/arc.h"
 #include "formats/nc/block_plan.h"
 #include "formats/nc/block_words.h"
 #include "formats/nc/coordinates.h"
@@ -20,6 +23,13 @@
 
 namespace smoothpost::nc {
 
+/// Where a label or block number stands around a block, in one program of the text.
+struct LabelPlaces {
+  std::optional<std::uint32_t> before;  ///< the last one at or before the block
+  std::optional<std::uint32_t> behind;  ///< the first one behind it
+  std::size_t count = 0;
+};
+
 /// Runs the blocks of one program in the order of execution of RS274NGC.
 ///
 /// One object runs one program. What a block does in which order stands in executor.cpp, motion in
@@ -27,7 +37,8 @@ namespace smoothpost::nc {
 /// execute_splines.cpp, offsets in execute_offsets.cpp, tools in execute_tools.cpp, cutter radius
 /// in execute_radius.cpp, process words and comments in execute_process.cpp, loops and branches in
 /// execute_flow.cpp, calls in execute_calls.cpp, saved modal state in execute_saved_state.cpp, what
-/// only other controls have in execute_dialects.cpp and execute_siemens.cpp.
+/// only other controls have in execute_dialects.cpp and the
+/// files execute_siemens*.cpp.
 class Executor {
  public:
   Executor(const Program& program, const InterpreterSettings& settings, const EventMatcher& matcher,
@@ -40,6 +51,7 @@ class Executor {
   bool spend(std::uint64_t amount, TextPlace place);
   void stop(const char* code, std::string text, TextPlace place);
   void block(const BlockWords& block);
+  void planned(const BlockWords& block);
   void act(const BlockWords& block, const BlockPlan& plan);
   void set_modes(const BlockWords& block);
   void set_feed_mode(const BlockWords& block);
@@ -97,6 +109,8 @@ class Executor {
   void end_program_call(const BlockWords& block, const ProcessAction& action);
   bool enter_program(long number, CallFrame frame, bool& found);
   bool enter(ProgramUnit& unit, CallFrame frame);
+  void run_within(std::size_t begin, std::size_t end);
+  bool leave_range();
   void leave_call();
   ProgramUnit* unit_of_file(const std::string& name, TextPlace place);
   void end_of_text();
@@ -138,10 +152,39 @@ class Executor {
   void set_tcp_by_offset(GCode code);
   void warn_dialect(const BlockWords& block);
   void warn_once(unsigned which, std::string text, const BlockWords& block, std::uint32_t piece);
-  void go_to_label(const FlowStatement& statement);
+  void siemens_flow(const FlowStatement& statement, std::uint32_t number);
+  void go_to_label(const std::string& label, int direction, const FlowStatement& from);
+  LabelPlaces places_of(const std::string& label, std::uint32_t block, std::uint32_t around);
+  void go_by_case(const FlowStatement& statement);
+  void count_loop(const FlowStatement& statement, std::uint32_t number);
+  std::optional<double> whole_value(const FlowStatement& statement, std::size_t offset);
+  void repeat_part(const FlowStatement& statement);
+  void call_siemens(const FlowStatement& statement);
+  bool enter_section(ProgramUnit& unit, const std::string& name, CallFrame frame, bool& found);
+  void begin_siemens_program();
+  void end_siemens_program(std::uint32_t line);
   void turn_by_sense(const BlockWords& block, AxisWords& end) const;
   void point_arc(const BlockWords& block, const BlockPlan& plan);
+  std::optional<Vec3> tangent_at_end() const;
+  void named_motion(const BlockWords& block, const BlockPlan& plan);
+  void tangent_arc(const BlockWords& block, const BlockPlan& plan);
+  void polynomial(const BlockWords& block, const BlockPlan& plan);
+  std::optional<BlockWords> rewritten(const BlockWords& block);
+  std::string write_polar(BlockWords& block);
+  std::string write_vector(BlockWords& block);
+  std::string write_polynomial(BlockWords& block);
+  std::string read_offset_data(std::string_view text);
+  void swivel(const BlockWords& block);
+  void leave_plane();
+  void set_pole(const BlockWords& block, const BlockPlan& plan);
+  void shift_axes(const BlockWords& block, const BlockPlan& plan);
+  Mat3 frame_stretch(const BlockWords& block) const;
+  std::string frame_problem(const BlockWords& block) const;
+  std::vector<std::uint32_t> statements_of(const BlockWords& block, SiemensWord word) const;
+  void take_offset_data(const BlockWords& block);
   void define_drilling(const BlockWords& block, const BlockPlan& plan);
+  void drill_pattern(const BlockWords& block, const BlockPlan& plan, std::string_view name,
+                     const CycleValues& values);
   void drill_by_call(const BlockWords& block, const BlockPlan& plan, const DrillingCall& call);
   void turn_axis(const BlockWords& block, const BlockPlan& plan);
   AxisMask absolute_axes(const BlockWords& block, AxisMask axes) const;
@@ -149,6 +192,10 @@ class Executor {
   void motion(const BlockWords& block, const BlockPlan& plan);
   void straight(const BlockWords& block, const BlockPlan& plan);
   void arc(const BlockWords& block, const BlockPlan& plan);
+  std::string arc_form(const BlockWords& block, const BlockPlan& plan) const;
+  PlaneArc arc_by_angle(const BlockWords& block, ArcWords& words);
+  PlanePoint arc_centre(const BlockWords& block, const ArcWords& words) const;
+  void finish_arc(const BlockWords& block, const PlaneArc& found);
   bool feed_given(const BlockWords& block, const BlockPlan& plan);
   double duration_of(const CanonicalMotion& motion, double xyz_length,
                      const BlockWords& block) const;
@@ -193,10 +240,16 @@ class Executor {
   std::vector<CallFrame> frames_;                        ///< the first is the program
   ControlNet control_points_;                            ///< of G5.2 so far, world coordinates
   std::size_t spline_order_ = 3;
+  std::array<std::vector<double>, 3> polynomials_;  ///< a2, a3 .. of PO[X], PO[Y], PO[Z]; mm
+  std::map<int, WorkOffset> pending_offsets_;       ///< $P_UIFR, until the next G54 .. G57
+  AxisWords added_shift_{};           ///< the part of the frame's shift by ATRANS, G59
+  bool axial_shift_ = false;          ///< G59 is in it
   std::optional<Vec3> last_tangent_;  ///< of a G5: from its last inner control point to its end
   bool called_ = false;               ///< some subroutine was called
   std::uint64_t budget_ = 0;
   bool stopped_ = false;  ///< what would come next is not known
+  /// The blocks that are run: the text, or of siemens a program of it or a repeated part.
+  std::size_t range_begin_ = 0, range_end_ = 0;
 };
 
 }  // namespace smoothpost::nc

@@ -1,6 +1,7 @@
 #include "formats/nc/flow_index.h"
 
 #include <algorithm>
+#include <optional>
 #include <tuple>
 #include <unordered_set>
 
@@ -16,10 +17,11 @@ constexpr std::uint32_t kNone = FlowStatement::kNone;
 constexpr std::size_t kDeepest = 100;  // loops and branches within each other
 
 const char* keyword_of(Kind kind) {
-  constexpr const char* kNames[] = {"sub",   "endsub", "call",      "return", "while",  "endwhile",
-                                    "do",    "repeat", "endrepeat", "if",     "elseif", "else",
-                                    "endif", "break",  "continue",  "GOTO",   "IF",     "IF",
-                                    "WHILE", "DO",     "END",       "GOTO",   "IF"};
+  constexpr const char* kNames[] = {
+      "sub",       "endsub", "call",   "return",  "while",  "endwhile", "do",       "repeat",
+      "endrepeat", "if",     "elseif", "else",    "endif",  "break",    "continue", "GOTO",
+      "IF",        "IF",     "WHILE",  "DO",      "END",    "GOTO",     "IF",       "CASE",
+      "FOR",       "ENDFOR", "LOOP",   "ENDLOOP", "REPEAT", "UNTIL",    "REPEAT",   "call"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 
@@ -39,6 +41,12 @@ bool fits(Kind kind, Kind open) {
              (open == Kind::otherwise && kind == Kind::endif);
     case Kind::macro_end:
       return open == Kind::macro_while || open == Kind::macro_do;
+    case Kind::endfor:
+      return open == Kind::counted_for;
+    case Kind::endloop:
+      return open == Kind::endless_loop;
+    case Kind::until:
+      return open == Kind::repeat_until;
     default:
       return false;
   }
@@ -62,12 +70,18 @@ class Pairing {
       case Kind::branch_if:
       case Kind::macro_while:
       case Kind::macro_do:
+      case Kind::counted_for:
+      case Kind::endless_loop:
+      case Kind::repeat_until:
         return open(number);
       case Kind::endsub:
       case Kind::endwhile:
       case Kind::endrepeat:
       case Kind::endif:
       case Kind::macro_end:
+      case Kind::endfor:
+      case Kind::endloop:
+      case Kind::until:
       case Kind::elseif:
       case Kind::otherwise:
         return close(number);
@@ -168,9 +182,12 @@ class Pairing {
     }
     const std::uint32_t last = open_.back();
     if (!fits(kind, now(last).text.kind) || now(last).text.label != statement.text.label) {
-      statement.fault = std::string(keyword_of(kind)) + " with label " + statement.text.label +
-                        " does not fit the " + keyword_of(now(last).text.kind) + " with label " +
-                        now(last).text.label + " that is open";
+      const auto with_label = [](const FlowText& text) {
+        return std::string(keyword_of(text.kind)) +
+               (text.label.empty() ? "" : " with label " + text.label);
+      };
+      statement.fault = with_label(statement.text) + " does not fit the " +
+                        with_label(now(last).text) + " that is open";
       // What it was meant to close is closed too, so that one fault is one message.
       while (kind == Kind::endsub && !open_.empty()) pop();
       return;
@@ -249,7 +266,95 @@ std::string label_name(const Program& program, const Piece& piece) {
   return name;
 }
 
+/// The programs of a Sinumerik text.
+class Sections {
+ public:
+  explicit Sections(std::vector<FlowIndex::Section>& sections) : sections_(sections) {
+    sections_.emplace_back();
+  }
+
+  /// A line %_N_NAME_SPF. True: another program begins.
+  bool header(std::string_view text, std::uint32_t block) {
+    std::string name = upper_text(text.substr(4));
+    while (!name.empty() && detail::is_blank(name.back())) name.pop_back();
+    const bool subprogram = name.ends_with("_SPF");
+    name.resize(name.size() - 4);
+    const bool fresh = begin(block);
+    set_name(std::move(name), subprogram);
+    return fresh;
+  }
+
+  /// PROC. True: another program begins.
+  bool procedure(std::string_view text, std::uint32_t block, std::uint32_t piece, bool further) {
+    const bool fresh = further && begin(block);
+    if (fresh || sections_.back().name.empty()) {
+      std::size_t at = 4;
+      while (at < text.size() && detail::is_blank(text[at])) ++at;
+      std::size_t end = at;
+      while (end < text.size() && text[end] != '(' && !detail::is_blank(text[end])) ++end;
+      set_name(upper_text(text.substr(at, end - at)), true);
+    }
+    sections_.back().procedure = piece;
+    used_ = true;
+    return fresh;
+  }
+
+  void use() { used_ = true; }
+  void finish(std::uint32_t blocks) { sections_.back().end = blocks; }
+
+ private:
+  bool begin(std::uint32_t block) {
+    const bool fresh = used_;
+    if (fresh) {
+      sections_.back().end = block;
+      sections_.emplace_back();
+      sections_.back().begin = block;
+    }
+    used_ = false;
+    return fresh;
+  }
+
+  void set_name(std::string name, bool subprogram) {
+    FlowIndex::Section& now = sections_.back();
+    now.subprogram = subprogram;
+    now.name = std::move(name);
+    used_ = used_ || now.begin != 0;
+  }
+
+  std::vector<FlowIndex::Section>& sections_;
+  bool used_ = false;
+};
+
+bool is_section(const Piece& piece) {
+  return piece.kind == PieceKind::statement &&
+         (piece.detail == static_cast<std::uint8_t>(SiemensWord::program_name) ||
+          piece.detail == static_cast<std::uint8_t>(SiemensWord::procedure) ||
+          piece.detail == static_cast<std::uint8_t>(SiemensWord::further_procedure));
+}
+
+/// True: another program begins with this piece.
+bool add_section(Sections& sections, const Program& program, const Piece& piece,
+                 std::uint32_t block, std::uint32_t number) {
+  const std::string_view text = text_of(program, piece);
+  const auto word = static_cast<SiemensWord>(piece.detail);
+  if (word == SiemensWord::program_name) return sections.header(text, block);
+  return sections.procedure(text, block, number, word == SiemensWord::further_procedure);
+}
+
 }  // namespace
+
+const FlowIndex::Section& FlowIndex::section_of(std::uint32_t block) const {
+  const auto behind =
+      std::upper_bound(sections.begin(), sections.end(), block,
+                       [](std::uint32_t value, const Section& s) { return value < s.begin; });
+  return behind == sections.begin() ? sections.front() : behind[-1];
+}
+
+const FlowIndex::Section* FlowIndex::section(const std::string& name) const {
+  for (const Section& s : sections)
+    if (s.name == name) return &s;
+  return nullptr;
+}
 
 std::uint32_t FlowIndex::of_block(std::uint32_t block) const {
   const auto found = std::lower_bound(
@@ -279,11 +384,25 @@ FlowIndex index_flow(const Program& program) {
   FlowIndex index;
   Pairing pairing(index);
   const bool numbers = program.dialect != InputDialect::linuxcnc;
+  const bool siemens = program.dialect == InputDialect::siemens;
+  std::optional<Sections> sections;
+  if (siemens) sections.emplace(index.sections);
   std::uint32_t region = 0;
   for (std::uint32_t b = 0; b < program.blocks.size(); ++b) {
     const Block& block = program.blocks[b];
     for (std::uint32_t i = block.first_piece; i < block.first_piece + block.piece_count; ++i) {
       const Piece& piece = program.pieces[i];
+      if (siemens && is_section(piece)) {
+        if (add_section(*sections, program, piece, b, i)) {
+          pairing.end_region();
+          region = b;
+        }
+        continue;
+      }
+      if (siemens && piece.kind != PieceKind::space && piece.kind != PieceKind::line_end &&
+          piece.kind != PieceKind::comment) {
+        sections->use();
+      }
       if (piece.kind == PieceKind::flow) {
         FlowStatement statement;
         statement.text = read(program, piece);
@@ -305,6 +424,7 @@ FlowIndex index_flow(const Program& program) {
     }
   }
   pairing.finish();
+  if (siemens) sections->finish(static_cast<std::uint32_t>(program.blocks.size()));
   std::sort(index.numbers.begin(), index.numbers.end(),
             [](const FlowIndex::Numbered& a, const FlowIndex::Numbered& b) {
               return std::tuple(a.region, a.number, a.block) <

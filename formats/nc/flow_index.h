@@ -38,27 +38,40 @@ struct FlowIndex {
     bool twice = false;  ///< the number stands in the text more than once
   };
 
+  /// A program of a Sinumerik text: from %_N_NAME_SPF, or PROC behind an end, to the next one.
+  struct Section {
+    std::string name;         ///< upper case; empty: the text before the first of such lines
+    std::uint32_t begin = 0;  ///< block
+    std::uint32_t end = 0;    ///< block behind the last one
+    std::uint32_t procedure = FlowStatement::kNone;  ///< piece of its PROC
+    bool subprogram = false;                         ///< %_N_NAME_SPF or PROC
+  };
+
   std::vector<FlowStatement> statements;                ///< in order of the text
   std::unordered_map<std::string, std::uint32_t> subs;  ///< sub statements by label
   std::map<long, ProgramLabel> programs;                ///< O numbers that stand alone
   std::vector<std::uint32_t> regions;                   ///< their blocks, rising
   std::vector<Numbered> numbers;                        ///< sorted; not of linuxcnc
   std::unordered_map<std::string, std::vector<std::uint32_t>> labels;  ///< siemens NAME:, by block
+  std::vector<Section> sections;                                       ///< siemens, at least one
 
   /// The statement of a block; @pre the block has one.
   std::uint32_t of_block(std::uint32_t block) const;
   /// The block of the last O number at or before `block`, 0 when there is none.
   std::uint32_t region_of(std::uint32_t block) const;
+  /// The section that a block stands in. @pre siemens
+  const Section& section_of(std::uint32_t block) const;
+  /// The section of that name; nullptr: there is none.
+  const Section* section(const std::string& name) const;
   /// Blocks with N`number` in a region, at most two.
   std::vector<std::uint32_t> numbered(std::uint32_t region, long number) const;
 };
 
 /// Pairs the statements of a program: each end with the begin that is open before it, by kind and
-/// label. Faults stand with their statement: a missing or crossed partner, a subroutine within a
-/// subroutine or a loop, a label that its subroutine (or the main program) has already used,
-/// return outside a subroutine, break and continue outside a while or do of their label, more than
-/// 100 of them within each other.
-/// Cost: one pass over the pieces.
+/// label; those of siemens within one section. Faults stand with their statement: a missing or
+/// crossed partner, a subroutine within a subroutine or a loop, a label that its subroutine (or the
+/// main program) has already used, return outside a subroutine, break and continue outside a while
+/// or do of their label, more than 100 of them within each other. Cost: one pass over the pieces.
 FlowIndex index_flow(const Program& program);
 
 }  // namespace smoothpost::nc

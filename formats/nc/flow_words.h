@@ -11,7 +11,7 @@
 namespace smoothpost::nc {
 
 /// What a line of program flow does: the O words of RS274NGC (IF and WHILE of siemens too), then
-/// the macro statements of the Fanuc family, then the jumps of siemens.
+/// the macro statements of the Fanuc family, then the jumps, loops and calls of siemens.
 enum class FlowKind : std::uint8_t {
   sub,
   endsub,
@@ -35,7 +35,23 @@ enum class FlowKind : std::uint8_t {
   macro_do,
   macro_end,
   label_goto,  ///< siemens GOTO, GOTOF, GOTOB
-  label_if_goto
+  label_if_goto,
+  label_case,   ///< CASE (v) OF 1 GOTOF A 2 GOTOF B DEFAULT GOTOF C
+  counted_for,  ///< FOR R1=1 TO 5
+  endfor,
+  endless_loop,  ///< LOOP
+  endloop,
+  repeat_until,  ///< REPEAT, at whose end UNTIL stands
+  until,
+  repeat_part,  ///< REPEAT label, REPEATB label: a part of the program once more
+  program_call  ///< L100, NAME(args), CALL "NAME"
+};
+
+/// A jump of CASE. Offsets count in the text of its line.
+struct CaseJump {
+  std::size_t value = static_cast<std::size_t>(-1);  ///< where its constant begins; DEFAULT: none
+  std::string label;
+  int direction = 0;  ///< 1 GOTOF, -1 GOTOB
 };
 
 /// A line of program flow, taken apart. Offsets count in the text that was read.
@@ -46,12 +62,16 @@ struct FlowText {
   std::string label;                   ///< lower case, no blanks; "100" of o100; loop number of DO
   std::size_t computed_label = kNone;  ///< o#1, o[#1+2]: where its value begins
   std::vector<std::size_t> values;     ///< where the condition, count, arguments begin
-  std::size_t target = kNone;          ///< where the number behind GOTO begins
-  std::size_t consequence = kNone;     ///< where the assignment behind THEN begins
+  std::size_t target = kNone;          ///< where the number behind GOTO begins; siemens: the value
+                                       ///< behind TO of FOR, the count behind P
+  std::size_t consequence = kNone;     ///< where the assignment behind THEN or FOR begins
   int direction = 0;                   ///< siemens: 1 GOTOF, -1 GOTOB
-  std::size_t length = 0;              ///< bytes of the whole statement
-  std::string problem;                 ///< empty: it can be read
-  std::size_t at = 0;                  ///< offset of the fault
+  std::string name;             ///< siemens: counter of FOR, program of a call, end label of REPEAT
+  bool one_block = false;       ///< siemens REPEATB
+  std::vector<CaseJump> cases;  ///< siemens CASE, in their order
+  std::size_t length = 0;       ///< bytes of the whole statement
+  std::string problem;          ///< empty: it can be read
+  std::size_t at = 0;           ///< offset of the fault
   bool ok() const { return problem.empty(); }
 };
 

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
 #include "formats/nc/codes.h"
 #include "formats/nc/event_words.h"
+#include "formats/nc/siemens_cycles.h"
 #include "kernels/core/canonical_motion.h"
 
 namespace smoothpost::nc {
@@ -24,12 +26,15 @@ struct CycleMemory {
   bool incremental = false;  ///< G91 at the series' last block
 };
 
-/// CYCLE81 and CYCLE82 of siemens: heights in program coordinates, mm; s.
-struct DrillingCall {
-  double retract = 0.0;
-  double clearance = 0.0;
-  double depth = 0.0;
-  double dwell = 0.0;
+/// What A2= B2= C2= of siemens are.
+enum class AxisAngles : std::uint8_t { none, euler, roll_pitch_yaw };
+
+/// Polar coordinates of siemens in the active plane, program coordinates, mm and degrees.
+struct PolarState {
+  double first = 0.0, second = 0.0;     ///< the pole
+  bool set = false;                     ///< by the program; else it is the zero
+  bool lost = false;                    ///< the frame or plane changed since
+  std::optional<double> radius, angle;  ///< the last ones
 };
 
 /// The modal state of RS274NGC but for coordinates; the values are those at the start of a program.
@@ -37,7 +42,10 @@ struct ModalState {
   GCode motion = kNoCode;
   GCode base_motion = 0;  ///< the last of G0 to G3, which G80 goes back to in the Fanuc family
   CycleMemory cycle;
-  std::optional<DrillingCall> drilling;  ///< siemens MCALL
+  std::optional<DrillingCall> drilling;       ///< siemens MCALL
+  AxisAngles axis_angles = AxisAngles::none;  ///< siemens ORIEULER, ORIRPY
+  PolarState polar;
+  bool swivelled = false;  ///< siemens CYCLE800: the tool stands normal to the frame's XY plane
   GCode plane = 170;
   bool incremental = false;
   bool arc_absolute = false;

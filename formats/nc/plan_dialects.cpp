@@ -13,9 +13,13 @@ constexpr AxisMask kRotaryAxes = 0x38;
 
 bool is_arc(GCode motion) { return motion == 20 || motion == 30; }
 
+bool is_pole(GCode code) { return code == 1100 || code == 1110 || code == 1120; }
+
 bool has_frame(const BlockWords& block) {
   return block.says(SiemensWord::trans) || block.says(SiemensWord::atrans) ||
-         block.says(SiemensWord::rot) || block.says(SiemensWord::arot);
+         block.says(SiemensWord::rot) || block.says(SiemensWord::arot) ||
+         block.says(SiemensWord::mirror) || block.says(SiemensWord::amirror) ||
+         block.says(SiemensWord::scale) || block.says(SiemensWord::ascale);
 }
 
 }  // namespace
@@ -25,7 +29,9 @@ bool BlockPlanner::takes_axes(const BlockWords& block) const {
   const GCode code = block.code(GGroup::non_modal);
   if (code == 100 || code == 280 || code == 300 || code == 520 || code == 920) return true;
   if (dialect_ == InputDialect::linuxcnc) return false;
-  if (dialect_ == InputDialect::siemens) return has_frame(block);
+  if (dialect_ == InputDialect::siemens) {
+    return has_frame(block) || code == 580 || code == 590 || is_pole(code);
+  }
   // G4 X2.5; G05.1 Q2 X0 Y0 Z0 names the axes that are smoothed.
   const GCode mode = block.code(GGroup::no_effect);
   return code == 40 || code == kMacroCall || (mode == 51 && block.has('Q') && block['Q'] == 2.0);
@@ -141,7 +147,11 @@ LetterMask BlockPlanner::letters_of_dialect(const BlockWords& block,
   if (dialect_ == InputDialect::siemens) {
     used |= letter_bit('D');
     if (is_arc(plan_.motion)) {
-      used |= letter_bit(kCircleRadius) | letter_bit(kCircleTurns);
+      used |= letter_bit(kCircleRadius) | letter_bit(kCircleTurns) | letter_bit(kArcAngle);
+    }
+    if (plan_.motion == kPolynomial) used |= letter_bit(kParameterLength);
+    if (is_pole(block.code(GGroup::non_modal))) {
+      used |= letter_bit(kPolarAngle) | letter_bit(kPolarRadius);
     }
     if (plan_.motion == kPointArc) {
       used |= letter_bit(kThroughX) | letter_bit(kThroughY) | letter_bit(kThroughZ);

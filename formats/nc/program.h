@@ -41,15 +41,22 @@ enum class WordForm : std::uint8_t {
 };
 
 /// Addresses of more than one letter, behind Z in a word's `letter`.
-inline constexpr char kAxisVectorX = 'Z' + 1;   ///< A3
-inline constexpr char kAxisVectorY = 'Z' + 2;   ///< B3
-inline constexpr char kAxisVectorZ = 'Z' + 3;   ///< C3
-inline constexpr char kCircleRadius = 'Z' + 4;  ///< CR
-inline constexpr char kCircleTurns = 'Z' + 5;   ///< TURN
-inline constexpr char kPlaneAngle = 'Z' + 6;    ///< RPL
-inline constexpr char kThroughX = 'Z' + 7;      ///< I1
-inline constexpr char kThroughY = 'Z' + 8;      ///< J1
-inline constexpr char kThroughZ = 'Z' + 9;      ///< K1
+inline constexpr char kAxisVectorX = 'Z' + 1;       ///< A3
+inline constexpr char kAxisVectorY = 'Z' + 2;       ///< B3
+inline constexpr char kAxisVectorZ = 'Z' + 3;       ///< C3
+inline constexpr char kCircleRadius = 'Z' + 4;      ///< CR
+inline constexpr char kCircleTurns = 'Z' + 5;       ///< TURN
+inline constexpr char kPlaneAngle = 'Z' + 6;        ///< RPL
+inline constexpr char kThroughX = 'Z' + 7;          ///< I1
+inline constexpr char kThroughY = 'Z' + 8;          ///< J1
+inline constexpr char kThroughZ = 'Z' + 9;          ///< K1
+inline constexpr char kArcAngle = 'Z' + 10;         ///< AR
+inline constexpr char kPolarAngle = 'Z' + 11;       ///< AP
+inline constexpr char kPolarRadius = 'Z' + 12;      ///< RP
+inline constexpr char kAxisAngleA = 'Z' + 13;       ///< A2
+inline constexpr char kAxisAngleB = 'Z' + 14;       ///< B2
+inline constexpr char kAxisAngleC = 'Z' + 15;       ///< C2
+inline constexpr char kParameterLength = 'Z' + 16;  ///< PL
 
 struct Piece {
   PieceKind kind = PieceKind::space;

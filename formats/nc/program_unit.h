@@ -41,8 +41,10 @@ struct SavedState {
 struct CallFrame {
   enum class Style : std::uint8_t {
     main,
-    oword,   ///< o<name> call ... endsub
-    program  ///< M98, M97, G65 ... M99
+    oword,    ///< o<name> call ... endsub
+    program,  ///< M98, M97, G65 ... M99
+    siemens,  ///< L100, NAME(..) ... M17
+    part      ///< siemens REPEAT: a part of the program that calls it
   };
   Style style = Style::main;
   ProgramUnit* caller = nullptr;
@@ -50,7 +52,9 @@ struct CallFrame {
   std::uint32_t caller_input_line = 0;  ///< as BlockReader::select takes it
   TextPlace place;                      ///< of the call, in the caller's text
   std::size_t entry = 0;                ///< first block of the body
-  long repeats_left = 0;                ///< further runs of the body
+  std::size_t end = 0;                  ///< block behind its last one; 0: the end of the text
+  std::size_t caller_begin = 0, caller_end = 0;  ///< the blocks that the caller may run
+  long repeats_left = 0;                         ///< further runs of the body
   CallScope scope;
   std::optional<SavedState> saved;
   bool restores = false;  ///< M73: at the end of the call

@@ -25,9 +25,12 @@ bool goes_on(std::string_view rest) {
 }  // namespace
 
 void SiemensBuilder::content(const char* p) {
+  first_piece_ = program_.pieces.size();
+  header_ = false;
   while (p != line_end_) {
     p = detail::is_blank(*p) ? blanks(p) : item(p);
   }
+  program_began_ = program_began_ || (words_in_line_ && !header_);
 }
 
 const char* SiemensBuilder::item(const char* begin) {
@@ -38,7 +41,7 @@ const char* SiemensBuilder::item(const char* begin) {
     push(PieceKind::comment, begin, line_end_);
     return line_end_;
   }
-  if (c == '%' && only_blanks_) return statement(SiemensWord::no_effect, begin, line_end_);
+  if (c == '%' && only_blanks_) return header(begin);
   if (c == '/' && only_blanks_) {
     const char* end = begin + 1;
     if (end != line_end_ && detail::is_digit(*end)) ++end;
@@ -94,14 +97,17 @@ const char* SiemensBuilder::word_end(const char* begin, char letter, const Scann
       return push_construct(
           {Construct::misplaced_line_number, static_cast<std::uint32_t>(text.size())}, begin);
     }
+  } else if (letter == 'L' && begins_line()) {
+    return program_call(begin, scanned.next);
   } else if (letter == 'R' || letter == 'O' || letter == 'L' || letter == 'P' || letter == 'E' ||
              letter == 'Q') {
-    const std::string why = letter == 'L' || letter == 'P'
-                                ? ": calls of subprograms are not read in this version; let the "
-                                  "CAM post write the moves out"
-                                : ": no address of this control; R parameters are written R1=5, a "
-                                  "circle's radius CR=5";
+    const std::string why =
+        letter == 'L' || letter == 'P'
+            ? ": a call of a subprogram is a line of its own: L100 P3 or NAME P3"
+            : ": no address of this control; R parameters are written R1=5, a circle's radius CR=5";
     return push_refused("NC141", std::string(text) + why, text);
+  } else if (letter == 'G' && scanned.value > kMostSiemensCode) {
+    return push_refused("NC141", std::string(text) + ": no G code of this control", text);
   }
   push_word(letter, begin, scanned);
   if (letter == 'M' && !deleted_ &&
@@ -172,9 +178,9 @@ const char* SiemensBuilder::name(const char* begin, const char* name_end) {
   }
   if (is_siemens_flow(text)) return flow(begin);
   if (upper_text(text) == "MCALL") return modal_call(begin, name_end);
-  if (upper_text(text) == "CIP") {
+  if (const int motion = siemens_motion(text); motion != 0) {
     ScannedNumber code;
-    code.value = kPointArc / 10.0;
+    code.value = motion / 10.0;
     code.next = name_end;
     push_word('G', begin, code);
     return name_end;
@@ -183,19 +189,63 @@ const char* SiemensBuilder::name(const char* begin, const char* name_end) {
   if (next == '[') return array(begin, behind);
   if (next == ':' && !words_besides_n())
     return statement(SiemensWord::no_effect, begin, behind + 1);
-  if (upper_text(text) == "DEF") return declaration(begin, name_end);
+  if (upper_text(text) == "DEF") return declaration(begin);
+  if (upper_text(text) == "PROC") return procedure(begin);
+  // What is called is checked at the call.
+  if (upper_text(text) == "EXTERN" && begins_line())
+    return statement(SiemensWord::no_effect, begin, end_of_statement(begin));
   const SiemensWord word = siemens_keyword(text);
   if (word != SiemensWord::none) return statement(word, begin, name_end);
   if (text.size() == 1) return push_construct({Construct::letter_alone, 1}, begin);
   // What follows the first word of a command or jump belongs to it.
-  return refuse_name(begin, name_end, end_of_statement(begin));
+  return program_call(begin, end_of_statement(begin));
 }
 
-/// IF, ELSE, WHILE, GOTOF ...: a line of its own but for its number.
+/// %_N_NAME_MPF and %_N_NAME_SPF begin a program; other such lines have no effect.
+const char* SiemensBuilder::header(const char* begin) {
+  const char* end = end_of_statement(begin);
+  const std::string text = upper_text({begin, static_cast<std::size_t>(end - begin)});
+  const bool names = text.size() > 8 && text.starts_with("%_N_") &&
+                     (text.ends_with("_MPF") || text.ends_with("_SPF"));
+  if (!names) return statement(SiemensWord::no_effect, begin, line_end_);
+  program_.has_flow = program_.has_flow || words_seen_;
+  declared_.clear();
+  program_began_ = false;
+  header_ = true;
+  return statement(SiemensWord::program_name, begin, end);
+}
+
+/// NAME(args), L100: a line of its own. What stands to `refused_end` is refused when it is none.
+const char* SiemensBuilder::program_call(const char* begin, const char* refused_end) {
+  const char* name_end = behind_name(begin);
+  const std::string_view name(begin, static_cast<std::size_t>(name_end - begin));
+  const char* end = end_of_statement(begin);
+  const bool may = begins_line() && is_program_name(name) && !is_siemens_reserved(name);
+  const FlowText read =
+      may ? read_siemens_flow({begin, static_cast<std::size_t>(end - begin)}) : FlowText{};
+  if (may && read.ok()) return flow(begin);
+  return refuse_name(begin, name_end, refused_end);
+}
+
+/// Only the block's number, its skip level and a label stand before.
+bool SiemensBuilder::begins_line() const {
+  for (std::size_t i = first_piece_; i < program_.pieces.size(); ++i) {
+    const Piece& piece = program_.pieces[i];
+    const bool label =
+        piece.kind == PieceKind::statement && program_.text[piece.begin + piece.length - 1] == ':';
+    const bool number = piece.kind == PieceKind::word && piece.letter == 'N';
+    if (piece.kind != PieceKind::space && piece.kind != PieceKind::block_delete && !label &&
+        !number)
+      return false;
+  }
+  return true;
+}
+
+/// IF, ELSE, WHILE, GOTOF, L100 ...: a line of its own but for its number and a label.
 const char* SiemensBuilder::flow(const char* begin) {
   const char* end = end_of_statement(begin);
   const std::string_view text(begin, static_cast<std::size_t>(end - begin));
-  if (words_besides_n()) {
+  if (!begins_line()) {
     return push_refused("NC150", "a line of program flow has other words before it", text);
   }
   const FlowText read = read_siemens_flow(text);
@@ -219,7 +269,8 @@ const char* SiemensBuilder::modal_call(const char* begin, const char* name_end) 
   const std::string_view name(cycle, static_cast<std::size_t>(cycle_end - cycle));
   const char* end = open != line_end_ && *open == '(' ? behind_group(open, ')') : cycle_end;
   const bool closed = end > cycle && end[-1] == ')';
-  if (!closed || siemens_call(name, "0") != SiemensWord::single_call) {
+  const bool pattern = upper_text(name).starts_with("HOLES");
+  if (!closed || pattern || siemens_call(name, "0") != SiemensWord::single_call) {
     const char* const refused = end > cycle_end ? end : end_of_statement(begin);
     const std::string_view cycle_name(cycle, static_cast<std::size_t>(cycle_end - cycle));
     error("NC140", siemens_refusal(cycle_name.substr(0, 60)), cycle);
@@ -230,14 +281,54 @@ const char* SiemensBuilder::modal_call(const char* begin, const char* name_end) 
   return statement(SiemensWord::modal_call, begin, end);
 }
 
+/// NAME[..]=..: an element of an array, PO[X]=(..), $P_UIFR[1,X,TR]=.. .
 const char* SiemensBuilder::array(const char* begin, const char* bracket) {
   const char* end = behind_group(bracket, ']');
   const char* behind = skip_blanks(end);
-  if (behind != line_end_ && *behind == '=') {
-    const Evaluated value = evaluate_siemens(rest_of_line(behind + 1), nullptr);
-    end = value.ok() ? behind + 1 + value.length : end_of_statement(begin);
+  const char* name_end = behind_name(begin);
+  const std::string name = upper_text({begin, static_cast<std::size_t>(name_end - begin)});
+  const bool assigns = behind != line_end_ && *behind == '=';
+  const char* value = assigns ? skip_blanks(behind + 1) : line_end_;
+  if (assigns && (declared_.contains(name) || name == "R")) {
+    const Evaluated found = assign_siemens(rest_of_line(begin), nullptr);
+    if (!found.ok()) return refuse_value(begin, begin, found);
+    push(PieceKind::assignment, begin, begin + found.length);
+    words_in_line_ = words_seen_ = true;
+    return begin + found.length;
   }
-  return refuse_name(begin, behind_name(begin), end);
+  if (name == "PO" && value != line_end_ && *value == '(') {
+    const char* close = behind_group(value, ')');
+    if (close[-1] == ')') return statement(SiemensWord::polynomial, begin, close);
+  }
+  if (name == "$P_UIFR" && assigns) {
+    const char* close = value;
+    if (value != line_end_ && (*value == 'C' || *value == 'c')) {
+      close = behind_frame(value);
+    } else {
+      const Evaluated number = evaluate_siemens(rest_of_line(value), nullptr);
+      if (!number.ok()) return refuse_value(begin, value, number);
+      close = value + number.length;
+    }
+    return statement(SiemensWord::offset_data, begin, close);
+  }
+  if (assigns) {
+    const Evaluated number = evaluate_siemens(rest_of_line(behind + 1), nullptr);
+    end = number.ok() ? behind + 1 + number.length : end_of_statement(begin);
+  }
+  return refuse_name(begin, name_end, end);
+}
+
+/// CTRANS(..) or CTRANS(..):CROT(..).
+const char* SiemensBuilder::behind_frame(const char* begin) const {
+  const char* end = begin;
+  while (true) {
+    const char* open = skip_blanks(behind_name(end));
+    if (open == line_end_ || *open != '(') return open;
+    end = behind_group(open, ')');
+    const char* colon = skip_blanks(end);
+    if (colon == line_end_ || *colon != ':') return end;
+    end = skip_blanks(colon + 1);
+  }
 }
 
 const char* SiemensBuilder::call(const char* begin, const char* name_end) {
@@ -250,7 +341,7 @@ const char* SiemensBuilder::call(const char* begin, const char* name_end) {
   const std::string_view name(begin, static_cast<std::size_t>(name_end - begin));
   const std::string_view arguments(open + 1, static_cast<std::size_t>(end - open) - 2);
   const SiemensWord word = siemens_call(name, arguments);
-  if (word == SiemensWord::none) return refuse_name(begin, name_end, end);
+  if (word == SiemensWord::none) return program_call(begin, end);
   return statement(word, begin, end);
 }
 
@@ -258,20 +349,23 @@ const char* SiemensBuilder::assigned(const char* begin, const char* name_end, co
   const std::string_view text(begin, static_cast<std::size_t>(name_end - begin));
   const char* value = skip_blanks(equals + 1);
   if (const char known = siemens_address(text)) return address(begin, known, value);
-  const Evaluated found = evaluate_siemens(rest_of_line(value), nullptr);
   const std::string name = upper_text(text);
   const bool variable = is_r_parameter(name) || declared_.contains(name);
   const bool tolerance = is_siemens_tolerance(name);
-  if (!variable && !tolerance) {
+  if (variable && !tolerance) {
+    const Evaluated found = assign_siemens(rest_of_line(begin), nullptr);
+    if (!found.ok()) return refuse_value(begin, begin, found);
+    push(PieceKind::assignment, begin, begin + found.length);
+    words_in_line_ = words_seen_ = true;
+    return begin + found.length;
+  }
+  const Evaluated found = evaluate_siemens(rest_of_line(value), nullptr);
+  if (!tolerance) {
     return refuse_name(begin, name_end,
                        found.ok() ? value + found.length : end_of_statement(begin));
   }
   if (!found.ok()) return refuse_value(begin, value, found);
-  const char* end = value + found.length;
-  if (tolerance) return statement(SiemensWord::no_effect, begin, end);
-  push(PieceKind::assignment, begin, end);
-  words_in_line_ = words_seen_ = true;
-  return end;
+  return statement(SiemensWord::no_effect, begin, value + found.length);
 }
 
 /// A word with =, or with an exponent; `value` is where its value begins.
@@ -332,39 +426,44 @@ const char* SiemensBuilder::tool_name(const char* begin, const char* quote) {
   return span.next;
 }
 
-/// DEF REAL a, b=2.5
-const char* SiemensBuilder::declaration(const char* begin, const char* name_end) {
+/// DEF REAL a, b=2.5, c[5]
+const char* SiemensBuilder::declaration(const char* begin) {
   const char* end = end_of_statement(begin);
-  const char* type = skip_blanks(name_end);
-  const char* p = behind_name(type);
-  const std::string kind = upper_text({type, static_cast<std::size_t>(p - type)});
-  bool good = kind == "REAL" || kind == "INT" || kind == "BOOL";
-  while (good) {
-    p = skip_blanks(p);
-    good = declare(p);
-    p = skip_blanks(p);
-    if (p >= end || *p != ',') break;
-    ++p;
-  }
-  if (!good || p < end) {
+  const std::string_view text(begin, static_cast<std::size_t>(end - begin));
+  std::vector<std::string> names;
+  const Evaluated found = declare_siemens(text, nullptr, &names);
+  declared_.insert(names.begin(), names.end());
+  if (!found.ok() || found.length != text.size()) {
     return push_refused("NC140",
-                        "DEF: only scalar REAL, INT and BOOL variables with a plain value are "
-                        "read; let the CAM post write plain numbers",
-                        {begin, static_cast<std::size_t>(end - begin)});
+                        "DEF: " + (found.ok() ? "text behind the variables" : found.problem) +
+                            "; variables are REAL, INT, BOOL or STRING[n], with a plain value or "
+                            "as arrays",
+                        text);
   }
   return statement(SiemensWord::declaration, begin, end);
 }
 
-bool SiemensBuilder::declare(const char*& p) {
-  if (p == line_end_ || !begins_name(*p)) return false;
-  const char* end = behind_name(p);
-  declared_.insert(upper_text({p, static_cast<std::size_t>(end - p)}));
-  p = skip_blanks(end);
-  if (p == line_end_ || *p != '=') return p == line_end_ || *p != '[';
-  const Evaluated value = evaluate_siemens(rest_of_line(p + 1), nullptr);
-  if (!value.ok()) return false;
-  p += 1 + value.length;
-  return true;
+/// PROC NAME(REAL A, INT B): the head of the program that it stands in, or behind an end that of a
+/// further one.
+const char* SiemensBuilder::procedure(const char* begin) {
+  const char* end = end_of_statement(begin);
+  const std::string_view text(begin, static_cast<std::size_t>(end - begin));
+  const SiemensProcedure head = read_siemens_procedure(text);
+  const bool further = program_began_ && ended_ && quiet_;
+  std::string problem = head.problem;
+  if (!begins_line() || (program_began_ && !further)) {
+    problem = "it stands first in a program, alone on its line";
+  }
+  if (!problem.empty()) {
+    return push_refused("NC140", "PROC: " + problem + "; call the subprogram with plain values",
+                        text);
+  }
+  if (further) {
+    declared_.clear();
+    program_.has_flow = true;
+  }
+  for (const auto& parameter : head.parameters) declared_.insert(parameter.first);
+  return statement(further ? SiemensWord::further_procedure : SiemensWord::procedure, begin, end);
 }
 
 }  // namespace smoothpost::nc

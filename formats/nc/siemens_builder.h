@@ -3,7 +3,7 @@
 #include <string>
 #include <unordered_set>
 
-#include "formats/nc/siemens_expression.h"
+#include "formats/nc/siemens_assignment.h"
 #include "formats/nc/siemens_words.h"
 #include "formats/nc/tree_builder.h"
 
@@ -11,7 +11,7 @@ namespace smoothpost::nc {
 
 /// Splits the text of a Sinumerik 840D program: words (X10, X=R1+2, A3=0.1, X=AC(5), T="DRILL"),
 /// assignments to R parameters and declared variables, statements (TRAORI, MSG("text"), CTOL=0.02),
-/// ; comments, / and /1 skip levels, %_N_NAME_MPF lines.
+/// lines of program flow, ; comments, / and /1 skip levels, %_N_NAME_MPF lines.
 class SiemensBuilder final : public TreeBuilder {
  public:
   using TreeBuilder::TreeBuilder;
@@ -31,16 +31,23 @@ class SiemensBuilder final : public TreeBuilder {
   const char* flow(const char* begin);
   const char* modal_call(const char* begin, const char* name_end);
   const char* array(const char* begin, const char* bracket);
-  const char* declaration(const char* begin, const char* name_end);
-  bool declare(const char*& p);
+  const char* declaration(const char* begin);
+  const char* procedure(const char* begin);
+  const char* header(const char* begin);
+  const char* program_call(const char* begin, const char* refused_end);
+  bool begins_line() const;
   const char* statement(SiemensWord word, const char* begin, const char* end);
   const char* refuse_name(const char* begin, const char* name_end, const char* end);
   const char* refuse_value(const char* begin, const char* value, const Evaluated& found);
   const char* end_of_statement(const char* begin) const;
   const char* behind_name(const char* p) const;
+  const char* behind_frame(const char* begin) const;
   const char* behind_group(const char* open, char close) const;
 
-  std::unordered_set<std::string> declared_;
+  std::unordered_set<std::string> declared_;  ///< variables of the program that is read
+  std::size_t first_piece_ = 0;               ///< of this line
+  bool header_ = false;                       ///< this line is one
+  bool program_began_ = false;                ///< behind its header words came
 };
 
 }  // namespace smoothpost::nc

@@ -22,6 +22,14 @@ class Reader {
   Reader(std::string_view text, const SiemensVariables* values, bool condition)
       : text_(text), values_(values), condition_(condition) {}
 
+  SiemensIndices indices() {
+    SiemensIndices out;
+    out.values = read_indices();
+    out_.length = at_;
+    out.end = std::move(out_);
+    return out;
+  }
+
   Evaluated value() {
     out_.value = whole();
     out_.length = end_;
@@ -32,6 +40,24 @@ class Reader {
   }
 
  private:
+  std::vector<double> read_indices() {
+    std::vector<double> out;
+    const std::size_t open = at_++;
+    while (out_.ok()) {
+      out.push_back(sum());
+      const char c = peek();
+      if (c == ',' && out.size() < 3) {
+        ++at_;
+      } else if (c == ']') {
+        ++at_;
+        break;
+      } else {
+        fail("the bracket is not closed, or has more than three indices", open);
+      }
+    }
+    return out;
+  }
+
   char peek() {
     while (at_ < text_.size() && detail::is_blank(text_[at_])) ++at_;
     return at_ < text_.size() ? text_[at_] : '\0';
@@ -188,13 +214,18 @@ class Reader {
   double name_or_call(std::size_t begin) {
     const std::string word = name();
     if (condition_ && word == "NOT") return operand() == 0.0 ? 1.0 : 0.0;
-    if (condition_ && (word == "TRUE" || word == "FALSE")) return word == "TRUE" ? 1.0 : 0.0;
+    if (word == "TRUE" || word == "FALSE") return word == "TRUE" ? 1.0 : 0.0;
+    if (word == "$PI") return kPi;
     if (at_ < text_.size() && text_[at_] == '(') return call(word, begin);
-    if (at_ < text_.size() && text_[at_] == '[')
-      return fail("an array is not read: " + word, begin);
-    if (values_ == nullptr) return 0.0;
-    if (const auto found = values_->value(word)) return *found;
-    return fail(word + " has no value: no variable of that name was declared before", begin);
+    std::vector<double> indices;
+    if (at_ < text_.size() && text_[at_] == '[') {
+      if (word[0] == '$') return fail(word + " is a system variable, which is not read", begin);
+      indices = read_indices();
+    }
+    if (values_ == nullptr || !out_.ok()) return 0.0;
+    ParameterValue found = values_->value(word, indices);
+    if (!found.problem.empty()) return fail(std::move(found.problem), begin);
+    return found.value;
   }
 
   double call(const std::string& word, std::size_t begin) {
@@ -249,19 +280,16 @@ class Reader {
 
 }  // namespace
 
-std::optional<double> SiemensVariables::value(const std::string& name) const {
-  const auto found = values_.find(name);
-  if (found != values_.end()) return found->second;
-  if (is_r_parameter(name)) return 0.0;
-  return std::nullopt;
-}
-
 Evaluated evaluate_siemens(std::string_view text, const SiemensVariables* values) {
   return Reader(text, values, false).value();
 }
 
 Evaluated evaluate_siemens_condition(std::string_view text, const SiemensVariables* values) {
   return Reader(text, values, true).value();
+}
+
+SiemensIndices siemens_indices(std::string_view text, const SiemensVariables* values) {
+  return Reader(text, values, false).indices();
 }
 
 }  // namespace smoothpost::nc

@@ -12,16 +12,29 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_plain(std::string_view name) {
+bool is_plain(std::string_view name, InputDialect dialect) {
   if (name.empty() || name.size() > 200 || name.front() == '.') return false;
-  return std::all_of(name.begin(), name.end(), [](char c) {
-    return (c >= 'a' && c <= 'z') || detail::is_digit(c) || c == '_' || c == '-' || c == '.';
+  const bool siemens = dialect == InputDialect::siemens;
+  return std::all_of(name.begin(), name.end(), [&](char c) {
+    const bool letter = siemens ? c >= 'A' && c <= 'Z' : c >= 'a' && c <= 'z';
+    return letter || detail::is_digit(c) || c == '_' || (!siemens && (c == '-' || c == '.'));
   });
+}
+
+std::string lower_text(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c + 32);
+  return text;
 }
 
 std::vector<std::string> file_names(std::string_view name, InputDialect dialect) {
   const std::string text(name);
   if (dialect == InputDialect::linuxcnc) return {text + ".ngc"};
+  if (dialect == InputDialect::siemens) {
+    const std::string lower = lower_text(text);
+    return {text + ".SPF", lower + ".spf", text + ".spf", lower + ".SPF",
+            text + ".MPF", lower + ".mpf", text + ".mpf", lower + ".MPF"};
+  }
   const std::string padded = std::string(text.size() < 4 ? 4 - text.size() : 0, '0') + text;
   std::vector<std::string> names;
   for (const std::string& number : {padded, text}) {
@@ -65,7 +78,7 @@ void read(const fs::path& path, SubroutineFile& out) {
 SubroutineFile find_subroutine(const std::vector<std::string>& folders, std::string_view name,
                                InputDialect dialect) {
   SubroutineFile out;
-  if (!is_plain(name)) return out;
+  if (!is_plain(name, dialect)) return out;
   for (const std::string& folder : folders) {
     for (const std::string& file : file_names(name, dialect)) {
       const fs::path path = fs::path(folder) / file;

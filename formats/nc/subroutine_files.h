@@ -21,9 +21,10 @@ struct SubroutineFile {
 /// Largest file of one subroutine.
 inline constexpr std::size_t kLargestSubroutine = std::size_t{64} << 20;
 
-/// Looks for the file of the subroutine `name` (lower case) in `folders`, in their order, and
-/// reads it: NAME.ngc for LinuxCNC; O1234.nc, O1234.ngc, 1234.nc, 1234.ngc for the number 1234 of
-/// the Fanuc family.
+/// Looks for the file of the subroutine `name` (lower case; siemens: upper case) in `folders`, in
+/// their order, and reads it: NAME.ngc for LinuxCNC; O1234.nc, O1234.ngc, 1234.nc, 1234.ngc for the
+/// number 1234 of the Fanuc family; NAME.SPF, name.spf, NAME.spf, name.SPF, then the same with MPF
+/// for siemens, whose names have letters, digits and _ only.
 ///
 /// Only files directly in one of the folders are opened: a name with a path, "..", a leading point
 /// or other signs than letters, digits, _ - . is refused, and so is a file that is no regular file,

@@ -19,13 +19,6 @@ Evaluated behind(std::string_view text, std::size_t offset, Evaluate&& evaluate)
   return found;
 }
 
-std::string name_before(std::string_view text, std::size_t end) {
-  while (end > 0 && detail::is_blank(text[end - 1])) --end;
-  std::size_t begin = 0;
-  while (begin < end && detail::is_blank(text[begin])) ++begin;
-  return upper_text(text.substr(begin, end - begin));
-}
-
 }  // namespace
 
 Rs274Values::Rs274Values(const InterpreterSettings& settings, InputDialect dialect,
@@ -73,42 +66,53 @@ Evaluated SiemensValues::word(std::string_view text, WordForm form) {
 }
 
 Evaluated SiemensValues::assign(std::string_view text) {
-  const std::size_t equals = text.find('=');
-  if (upper_text(text.substr(0, 3)) == "DEF" && text.size() > 3 && detail::is_blank(text[3])) {
-    return declare(text);
-  }
-  const Evaluated found = behind(
-      text, equals + 1, [&](std::string_view rest) { return evaluate_siemens(rest, &variables_); });
-  if (found.ok()) variables_.assign(name_before(text, equals), found.value);
-  return found;
+  const auto begins = [&](std::string_view word) {
+    return text.size() > word.size() && upper_text(text.substr(0, word.size())) == word &&
+           detail::is_blank(text[word.size()]);
+  };
+  if (begins("DEF")) return declare_siemens(text, &variables_, nullptr);
+  if (begins("PROC")) return bind(text);
+  return assign_siemens(text, &variables_);
 }
 
-/// The builder has checked the text: DEF, a type, names with or without a value, commas.
-Evaluated SiemensValues::declare(std::string_view text) {
-  std::size_t at = 3;
-  const auto skip_blanks = [&] {
-    while (at < text.size() && detail::is_blank(text[at])) ++at;
-  };
-  skip_blanks();
-  while (at < text.size() && !detail::is_blank(text[at])) ++at;  // the type
-  Evaluated found;
-  while (at < text.size()) {
-    const std::size_t end = std::min(text.find_first_of(",=", at), text.size());
-    const std::string name = name_before(text.substr(at), end - at);
-    double value = 0.0;
-    at = end;
-    if (at < text.size() && text[at] == '=') {
-      found = behind(text, at + 1,
-                     [&](std::string_view rest) { return evaluate_siemens(rest, &variables_); });
-      if (!found.ok()) return found;
-      value = found.value;
-      at = found.length;
-      skip_blanks();
-    }
-    variables_.assign(name, value);
-    ++at;  // the comma
+/// PROC: its parameters take the arguments of the call, or their defaults.
+Evaluated SiemensValues::bind(std::string_view text) {
+  Evaluated out;
+  SiemensProcedure head = read_siemens_procedure(text);
+  out.problem = std::move(head.problem);
+  out.length = text.size();
+  const CallScope* call = calls_.empty() ? nullptr : &calls_.back();
+  const std::size_t count = head.parameters.size();
+  if (call == nullptr && count > 0) {
+    out.problem = "a subprogram with parameters was not called; name the program that calls it";
   }
-  return found;
+  if (!out.ok()) return out;
+  for (auto& [name, variable] : head.parameters) {
+    out.problem = variables_.declare(name, std::move(variable));
+    if (!out.ok()) return out;
+  }
+  if (call == nullptr) return out;
+  for (const auto& [place, value] : call->arguments) {
+    const auto number = static_cast<std::size_t>(place);
+    if (number >= count) {
+      out.problem = "the call gives more values than the " + std::to_string(count) +
+                    " parameters of the subprogram";
+      return out;
+    }
+    out.problem = variables_.assign(head.parameters[number].first, {}, value);
+    if (!out.ok()) return out;
+  }
+  return out;
+}
+
+void SiemensValues::enter_call(const CallScope& scope) {
+  variables_.enter();
+  calls_.push_back(scope);
+}
+
+void SiemensValues::leave_call() {
+  variables_.leave();
+  calls_.pop_back();
 }
 
 }  // namespace smoothpost::nc

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "formats/nc/block_words.h"
 #include "formats/nc/interpreter.h"
 #include "formats/nc/parameter_store.h"
-#include "formats/nc/siemens_expression.h"
+#include "formats/nc/siemens_assignment.h"
 
 namespace smoothpost::nc {
 
@@ -26,6 +28,8 @@ class Rs274Values final : public WordValues {
     return evaluate_value(text, store_.get(), rules_);
   }
   ParameterStore* store() override { return store_.get(); }
+  void enter_call(const CallScope& scope) override { store_->enter(scope); }
+  void leave_call() override { store_->leave(); }
 
  private:
   const ModalState& modal_;
@@ -47,12 +51,19 @@ class SiemensValues final : public WordValues {
     return evaluate_siemens_condition(text, &variables_);
   }
   bool inch() const override { return modal_.unit != 1.0; }
+  void enter_call(const CallScope& scope) override;
+  void leave_call() override;
+  void forget(const std::string& name) override { variables_.forget(name); }
+  std::optional<std::string> text(std::string_view text) override {
+    return siemens_text(text, variables_);
+  }
 
  private:
-  Evaluated declare(std::string_view text);
+  Evaluated bind(std::string_view text);
 
   const ModalState& modal_;
   SiemensVariables variables_;
+  std::vector<CallScope> calls_;  ///< their arguments, by place from 0
 };
 
 }  // namespace smoothpost::nc

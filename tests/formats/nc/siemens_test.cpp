@@ -190,7 +190,10 @@ TEST_CASE("siemens: words of the path mode have no effect", "[formats][nc][sieme
       "LABEL: Z3\nUPATH COMPOF",
       mill_settings());
   CHECK(r.errors() == std::vector<std::string>{"NC204"});  // G642 and G641
-  const Run good = siemens("G642 COMPCAD SOFT\nG60 G601 G9\nSUPA G0 Z=5 D0\nG1 X1 F5");
+  const Run good = siemens(
+      "WORKPIECE(,\"\",,\"BOX\",112,0,-20,-80,0,0,100,100)\n"
+      "GROUP_BEGIN(0,\"finish\",0,0)\nGROUP_END(0,0)\nG642 COMPCAD SOFT\nG60 G601 G9\nSUPA G0 Z=5 "
+      "D0\nG1 X1 F5");
   INFO(good.all_text());
   REQUIRE(good.ok);
   CHECK(good.sink.motions.front().machine_position);
@@ -204,19 +207,25 @@ TEST_CASE("siemens: what is refused is named with line and column", "[formats][n
     int column;
     const char* says;
   };
-  const Row rows[] = {{"G1 X1 F1 A2=5", "NC140", 10, "A3="},
+  const Row rows[] = {{"G1 X1 F1 A4=5", "NC140", 10, "A3="},
                       {"N5 BSPLINE X1", "NC140", 4, "splines"},
-                      {"POLY PO[X]=(1,2)", "NC140", 1, "splines"},
+                      {"POLY PO[PHI]=5", "NC140", 6, "PO[X]"},
                       {"IF R1>5 GOTOF", "NC150", 13, "label"},
-                      {"FOR R1=1 TO 5", "NC140", 1, "loops"},
+                      {"FOR R1=1 5", "NC150", 10, "TO"},
+                      {"FOR R1=1 TO 5", "NC250", 1, "no end"},
                       {"G1 X1 GOTOB A", "NC150", 7, "before it"},
-                      {"MCALL CYCLE83(1,2)", "NC140", 7, "CYCLE81"},
+                      {"MCALL SLOT1(1,2)", "NC140", 7, "CYCLE81"},
+                      {"MCALL CYCLE84(1,2)", "NC260", 1, "spindle"},
                       {"MCALL CYCLE81(1,2)", "NC260", 1, "DP"},
-                      {"CYCLE800(1,\"T\",0)", "NC140", 1, "CYCLE800"},
-                      {"MIRROR X0", "NC140", 1, "frame"},
+                      {"CYCLE800(1,\"T\",0)", "NC245", 1, "MODE 57"},
+                      {"TOFRAME", "NC140", 1, "frame"},
                       {"TRANSMIT", "NC140", 1, "transformation"},
                       {"G0 X=DC(30)", "NC141", 4, "DC()"},
-                      {"L100", "NC141", 1, "subprograms"},
+                      {"L100", "NC251", 1, "L100.SPF"},
+                      {"N10 NO_SUCH(5)", "NC251", 5, "NO_SUCH.SPF"},
+                      {"G1 X1 NO_SUCH", "NC140", 7, "no word"},
+                      {"PCALL /_N_A", "NC140", 1, "channels"},
+                      {"G999.8 X1", "NC141", 1, "G code"},
                       {"G0 X=_UNKNOWN", "NC131", 6, "_UNKNOWN"},
                       {"_UNKNOWN=5", "NC140", 1, "variable"},
                       {"G0 X=(1+2", "NC142", 6, "not closed"},
@@ -229,7 +238,7 @@ TEST_CASE("siemens: what is refused is named with line and column", "[formats][n
                       {"G81 X1", "NC201", 1, "G81"},
                       {"G0 X1.2.3", "NC105", 4, "X1.2"},
                       {"DEF AXIS A", "NC140", 1, "DEF"},
-                      {"CT X1 Y1", "NC140", 1, "arc"},
+                      {"INVCW X1 Y1", "NC140", 1, "arc"},
                       {"GOTOF NOWHERE", "NC250", 1, "NOWHERE"},
                       {"G4 S3", "NC217", 1, "seconds"}};
   for (const Row& row : rows) {

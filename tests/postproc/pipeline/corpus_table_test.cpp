@@ -115,6 +115,11 @@ TEST_CASE("corpus: every program is read or refused by what stands in it",
   for (const auto& [reason, count] : reasons)
     table += "\n  " + std::to_string(count) + "  " + reason;
   WARN(table);
+  const auto sinumerik = std::count_if(files.begin(), files.end(), [](const auto& path) {
+    return extension_of(path) == ".mpf" || extension_of(path) == ".spf";
+  });
+  CHECK(sinumerik >= 2);
+  CHECK(read["nc siemens"] == sinumerik);
   CHECK(read.size() >= 4);
   CHECK(reasons.size() > 5);
 }
