@@ -23,9 +23,9 @@ std::vector<std::string_view> arguments_of(std::string_view statement) {
   std::size_t begin = 0;
   for (std::size_t i = 0; i <= rest.size(); ++i) {
     const char c = i < rest.size() ? rest[i] : ',';
-    if (c == '(') ++depth;
-    if (c == ')') --depth;
-    if (c != ',' || depth > 0) continue;
+    if (c == '(' || c == '[') ++depth;
+    if (c == ')' || c == ']') --depth;
+    if (i < rest.size() && (c != ',' || depth > 0)) continue;
     std::string_view part = rest.substr(begin, i - begin);
     while (!part.empty() && detail::is_blank(part.front())) part.remove_prefix(1);
     while (!part.empty() && detail::is_blank(part.back())) part.remove_suffix(1);

@@ -32,7 +32,7 @@ std::vector<std::string_view> parts_of(std::string_view text) {
     const char c = i < text.size() ? text[i] : ',';
     if (c == '(' || c == '[') ++depth;
     if (c == ')' || c == ']') --depth;
-    if (c != ',' || depth > 0) continue;
+    if (i < text.size() && (c != ',' || depth > 0)) continue;
     out.push_back(trimmed(text.substr(begin, i - begin)));
     begin = i + 1;
   }
@@ -46,6 +46,73 @@ std::optional<std::size_t> axis_of(std::string_view name) {
   for (std::size_t i = 0; i < kAxisLetters.size(); ++i)
     if (kAxisLetters[i] == upper[0]) return i;
   return std::nullopt;
+}
+
+struct OffsetNumber {
+  double value = 0.0;
+  std::string problem;
+};
+
+OffsetNumber number_of(std::string_view text, WordValues& values) {
+  const Evaluated found = values.value(text);
+  if (found.ok() && found.length == text.size()) return {found.value, {}};
+  return {0.0, "a value cannot be read"};
+}
+
+/// A settable offset, or why it cannot be read.
+struct OffsetRead {
+  WorkOffset offset;
+  std::string problem;
+};
+
+struct OffsetComponent {
+  std::string_view axis;
+  std::string name;  ///< TR, RT, FI
+  double value = 0.0;
+};
+
+/// The offset with a component of one axis; lengths in `unit`, angles in degrees.
+OffsetRead with_component(WorkOffset offset, const OffsetComponent& component, double unit) {
+  const auto axis = axis_of(component.axis);
+  if (!axis) return {offset, "an axis is none of X Y Z A B C U V W"};
+  const bool rotary = *axis >= 3 && *axis < 6;
+  if (component.name == "TR") {
+    offset.words[*axis] = rotary ? radians_from_degrees(component.value) : component.value * unit;
+  } else if (component.name == "RT" && *axis == 2) {
+    offset.rotation = radians_from_degrees(component.value);
+  } else if (component.value != 0.0 || (component.name != "RT" && component.name != "FI")) {
+    return {offset, "of its components TR, RT of Z, and 0 for the other RT and FI are read"};
+  }
+  return {offset, {}};
+}
+
+/// CTRANS(X,v,..) and CROT(Z,v) behind it: a whole offset.
+OffsetRead offset_of_frame(std::string_view text, WordValues& values, double unit) {
+  OffsetRead out;
+  while (!text.empty()) {
+    const std::size_t begin = text.find('(');
+    const std::size_t end = text.find(')', std::min(begin, text.size()));
+    if (end == std::string_view::npos)
+      return {{}, "a frame is CTRANS(..) or CTRANS(..):CROT(Z,..)"};
+    const std::string function = upper_text(trimmed(text.substr(0, begin)));
+    if (function != "CTRANS" && function != "CROT") return {{}, function + " is not read"};
+    const auto words = parts_of(text.substr(begin + 1, end - begin - 1));
+    const bool none = words.size() == 1 && words[0].empty();
+    if (words.size() % 2 != 0 && !none) return {{}, "axes and values stand in pairs"};
+    for (std::size_t i = 0; i + 1 < words.size(); i += 2) {
+      const OffsetNumber number = number_of(words[i + 1], values);
+      if (!number.problem.empty()) return {{}, number.problem};
+      const char* name = function == "CTRANS" ? "TR" : "RT";
+      out = with_component(out.offset, {words[i], name, number.value}, unit);
+      if (!out.problem.empty()) return out;
+    }
+    text = trimmed(text.substr(end + 1));
+    if (text.empty()) break;
+    if (text.front() != ':') return {{}, "text behind the frame"};
+    if (function == "CROT") return {{}, "CROT stands last"};
+    text = trimmed(text.substr(1));
+  }
+  return out;
 }
 
 }  // namespace
@@ -265,64 +332,29 @@ std::string Executor::read_offset_data(std::string_view text) {
   const std::size_t equals = text.find('=', std::min(close, text.size()));
   if (close == std::string_view::npos || equals == std::string_view::npos) return "no such form";
   const auto head = parts_of(text.substr(open + 1, close - open - 1));
-  if (head.empty()) return "no such form";
+  if (head.size() != 1 && head.size() != 3) return "no such form";
   if (modal_.unit != modal_.feed_unit) return "under G70 its unit is not certain; write G700";
-  std::string problem;
-  const auto number = [&](std::string_view part) {
-    const Evaluated found = values_->value(part);
-    if (!found.ok() || found.length != part.size()) problem = "a value cannot be read";
-    return found.value;
-  };
-  const double system = number(head.front());
-  if (!problem.empty()) return problem;
-  if (system != 1.0 && system != 2.0 && system != 3.0 && system != 4.0) {
+  const OffsetNumber system = number_of(head.front(), *values_);
+  if (!system.problem.empty()) return system.problem;
+  if (system.value != 1.0 && system.value != 2.0 && system.value != 3.0 && system.value != 4.0) {
     return "the offsets 1 to 4, of G54 to G57, are read";
   }
-  const int place = static_cast<int>(system);
-  const auto pending = pending_offsets_.find(place);
-  WorkOffset offset =
-      pending != pending_offsets_.end() ? pending->second : coordinates_.offset(place);
-  const auto set = [&](std::string_view axis_name, std::string_view component, double value) {
-    const auto axis = axis_of(axis_name);
-    if (!axis) return std::string("an axis is none of X Y Z A B C U V W");
-    const bool rotary = *axis >= 3 && *axis < 6;
-    if (component == "TR") {
-      offset.words[*axis] = rotary ? radians_from_degrees(value) : value * modal_.unit;
-    } else if (component == "RT" && *axis == 2) {
-      offset.rotation = radians_from_degrees(value);
-    } else if (value != 0.0 || (component != "RT" && component != "FI")) {
-      return std::string("of its components TR, RT of Z, and 0 for the other RT and FI are read");
-    }
-    return std::string();
-  };
-  std::string_view value = trimmed(text.substr(equals + 1));
-  if (head.size() == 3) {
-    problem = set(head[1], upper_text(head[2]), number(value));
-  } else if (head.size() == 1) {
-    offset = {};
-    while (problem.empty() && !value.empty()) {
-      const std::size_t begin = value.find('(');
-      const std::size_t end = value.find(')', std::min(begin, value.size()));
-      if (end == std::string_view::npos) return "a frame is CTRANS(..) or CTRANS(..):CROT(Z,..)";
-      const std::string function = upper_text(trimmed(value.substr(0, begin)));
-      if (function != "CTRANS" && function != "CROT") return function + " is not read";
-      const auto words = parts_of(value.substr(begin + 1, end - begin - 1));
-      for (std::size_t i = 0; i + 1 < words.size() && problem.empty(); i += 2) {
-        problem = set(words[i], function == "CTRANS" ? "TR" : "RT", number(words[i + 1]));
-      }
-      if (words.size() % 2 != 0 && !(words.size() == 1 && words[0].empty())) {
-        return "axes and values stand in pairs";
-      }
-      value = trimmed(value.substr(end + 1));
-      if (!value.empty() && value.front() != ':') return "text behind the frame";
-      if (!value.empty() && function == "CROT") return "CROT stands last";
-      if (!value.empty()) value = trimmed(value.substr(1));
-    }
+  const int place = static_cast<int>(system.value);
+  const std::string_view value = trimmed(text.substr(equals + 1));
+  OffsetRead read;
+  if (head.size() == 1) {
+    read = offset_of_frame(value, *values_, modal_.unit);
   } else {
-    return "no such form";
+    const auto pending = pending_offsets_.find(place);
+    read.offset = pending != pending_offsets_.end() ? pending->second : coordinates_.offset(place);
+    const OffsetNumber number = number_of(value, *values_);
+    read.problem = number.problem;
+    if (read.problem.empty()) {
+      read = with_component(read.offset, {head[1], upper_text(head[2]), number.value}, modal_.unit);
+    }
   }
-  if (problem.empty()) pending_offsets_[place] = offset;
-  return problem;
+  if (read.problem.empty()) pending_offsets_[place] = read.offset;
+  return read.problem;
 }
 
 }  // namespace smoothpost::nc

@@ -53,6 +53,8 @@ Codes errors(const std::string& lines) { return siemens(lines).errors(); }
 
 TEST_CASE("siemens: the steps of the drilling cycles", "[formats][nc][siemens]") {
   CHECK(acts("CYCLE81(20,1,2,-5)") == Texts{"r0 3", "f0 -5", "r0 20"});
+  CHECK(acts("DEF REAL V_[2,2]=SET(1,2,3,-5)\nCYCLE81(10*V_[0,1],V_[0,0],2,V_[1,1])") ==
+        Texts{"r0 3", "f0 -5", "r0 20"});
   CHECK(acts("CYCLE82(20,1,2,,6,0.5)") == Texts{"r0 3", "f0 -5", "dwell 0.5", "r0 20"});
   // Chip breaking: lifts by 1 mm, or VRT, with the feed.
   CHECK(acts("CYCLE83(20,0,2,-25,,-10,,0,0.1,,1,0)") ==

@@ -281,7 +281,8 @@ TEST_CASE("siemens: settable offsets that the program writes", "[formats][nc][si
   for (const char* line :
        {"$P_UIFR[0,X,TR]=1", "$P_UIFR[5,X,TR]=1", "$P_UIFR[1,X,RT]=5", "$P_UIFR[1,X,SC]=2",
         "$P_UIFR[1,X,FI]=1", "$P_UIFR[1]=CMIRROR(X)", "$P_UIFR[1]=CTRANS(X)", "$P_UIFR[1,X]=1",
-        "G54 $P_UIFR[1,X,TR]=1", "G70\n$P_UIFR[1,X,TR]=1", "$P_UIFR[1]=CROT(Z,5):CTRANS(X,1)"}) {
+        "G54 $P_UIFR[1,X,TR]=1", "G70\n$P_UIFR[1,X,TR]=1", "$P_UIFR[1]=CTRANS([X,1)",
+        "$P_UIFR[1,X,TR,1]=1", "$P_UIFR[1]=CROT(Z,5):CTRANS(X,1)"}) {
     INFO(line);
     CHECK(errors(line) == Codes{"NC245"});
   }
