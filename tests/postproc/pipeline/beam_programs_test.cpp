@@ -307,6 +307,34 @@ TEST_CASE("beam programs: what no certified program does on any machine",
   for (const auto& [name, count] : counts) CHECK(count.refused <= 0.05 * count.certified);
 }
 
+TEST_CASE("beam programs: polynomials are certified where lines are, in fewer blocks",
+          "[postproc][pipeline][beam_programs][curves]") {
+  MachineDefinition lines = siemens("joint"), curves = lines;
+  std::size_t blocks = 0, fewer = 0;
+  for (int seed = 100; seed < 116; ++seed) {
+    Generator generator(static_cast<unsigned>(seed));
+    const std::string text = generator.program();
+    ConvertInput in;
+    in.input = read_program(text, "laser_5p1");
+    in.placement = shifted(700, 600, 1000);
+    in.machine = lines;
+    const Conversion straight = convert(in, false, {});
+    curves.dialect.curves = seed % 2 == 0 ? "cubic" : "quintic";
+    in.machine = curves;
+    const Conversion bent = convert(in, false, {});
+    for (const auto& d : bent.diagnostics) UNSCOPED_INFO(to_string(d));
+    INFO("seed " << seed << "\n" << text);
+    REQUIRE(bent.verdict == straight.verdict);
+    if (bent.verdict != Verdict::certified) continue;
+    REQUIRE(broken(bent, in.machine).empty());
+    REQUIRE(bent.blocks <= straight.blocks);
+    blocks += straight.blocks;
+    fewer += bent.blocks;
+  }
+  CAPTURE(blocks, fewer);
+  CHECK(2 * fewer < blocks);
+}
+
 TEST_CASE("beam programs: the rules find their own faults", "[postproc][pipeline][beam_programs]") {
   for (const Target& target : targets()) {
     Generator generator(21);
