@@ -83,7 +83,12 @@ AxisWords Executor::machine_target(const BlockWords& block, AxisMask axes) const
   return world;
 }
 
+/// In the plane of CYCLE800 the bits of X Y Z are those of the plane's axes, so that a position
+/// that two blocks give is known; finish_motion() hands on those of the world's.
 AxisMask Executor::unknown_at_target(const BlockWords& block, AxisMask axes) const {
+  if (modal_.swivelled) {
+    return static_cast<AxisMask>(coordinates_.unknown() & ~absolute_axes(block, axes));
+  }
   return coordinates_.unknown_after(absolute_axes(block, axes));
 }
 
@@ -108,12 +113,17 @@ void Executor::finish_motion() {
   if (offset_dirty_) announce_offset(motion_.line);
   const bool by_turn = modal_.per_turn && motion_.kind == MotionKind::feed;
   if (by_turn && motion_.pitch == 0.0) motion_.pitch = modal_.linear_feed;
+  const AxisMask unknown = motion_.unknown_end;
   if (modal_.swivelled && motion_.axis_vector) {
-    motion_.unknown_start = static_cast<AxisMask>(motion_.unknown_start & ~kRotaryAxes);
-    motion_.unknown_end = static_cast<AxisMask>(motion_.unknown_end & ~kRotaryAxes);
+    const auto in_world = [](AxisMask bits) {
+      constexpr AxisMask kLinear = 7;
+      return static_cast<AxisMask>(((bits & kLinear) != 0 ? bits | kLinear : bits) & ~kRotaryAxes);
+    };
+    motion_.unknown_start = in_world(motion_.unknown_start);
+    motion_.unknown_end = in_world(motion_.unknown_end);
   }
   sink_.motion(motion_);
-  coordinates_.move_to(motion_.end, motion_.unknown_end);
+  coordinates_.move_to(motion_.end, unknown);
   // Where the rotary axes are is the machine's affair then.
   if (motion_.axis_vector) coordinates_.forget(kRotaryAxes);
 }

@@ -64,7 +64,8 @@ void Executor::radius_compensation(const BlockWords& block) {
       const std::string tool = number == 0.0 ? "in the spindle" : shortest_text(number);
       return refuse("PR102",
                     "the diameter of the tool " + tool +
-                        " is not given; give its radius by G10 L1 P R in the program, or write " +
+                        " is not given; give it by --tool N=LENGTH,DIAMETER (mm), or its radius by "
+                        "G10 L1 P R in the program, or write " +
                         (code == 410 ? "G41.1" : "G42.1") + " with the diameter as D");
     }
     if (!none) diameter = 2.0 * *found->second.radius;

@@ -17,6 +17,7 @@ std::unique_ptr<WordValues> make_values(InputDialect dialect, const InterpreterS
 ToolTable tool_table(const InterpreterSettings& settings) {
   ToolTable tools;
   for (const auto& [tool, length] : settings.tool_lengths) tools[tool].length = length;
+  for (const auto& [tool, diameter] : settings.tool_diameters) tools[tool].radius = 0.5 * diameter;
   return tools;
 }
 

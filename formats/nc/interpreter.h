@@ -26,6 +26,7 @@ struct InterpreterSettings {
   AxisMask axes = 0x1ff;        ///< axis words that the input machine has; others are refused
   bool any_axis_needs_machine = false;     ///< rotary words are refused: no input machine was named
   std::map<int, double> tool_lengths;      ///< mm, by tool number
+  std::map<int, double> tool_diameters;    ///< mm, by tool number; for G41 and G42
   std::map<int, WorkOffset> work_offsets;  ///< by system 1..9 (G54..G59.3); absent: 0
   AxisWords home{};      ///< where the axes stand before the program; also G28/G30
   ProcessTable process;  ///< words <-> events of the input machine

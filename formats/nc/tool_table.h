@@ -14,7 +14,7 @@ struct ToolData {
   std::optional<int> orientation;
 };
 
-/// The tools of one run: those of InterpreterSettings::tool_lengths, changed by G10 L1, L10, L11.
+/// The tools of one run: those of InterpreterSettings, changed by G10 L1, L10, L11.
 using ToolTable = std::map<int, ToolData>;
 
 }  // namespace smoothpost::nc

@@ -129,8 +129,10 @@ void add_input_options(CLI::App* app, CommandLine& l) {
                   "G54=x,y,z[,a,b,c]: the program's zero on the input machine")
       ->take_all()
       ->allow_extra_args(false);
-  app->add_option("--tool", l.tool,
-                  "N=length or NAME:N=length in mm, NAME as the input calls the tool; repeatable")
+  app->add_option(
+         "--tool", l.tool,
+         "N=length, N=length,diameter (for G41, G42) or NAME:N=length in mm, NAME as the input "
+         "calls the tool; repeatable")
       ->take_all()
       ->allow_extra_args(false);
   app->add_option("--tip-tolerance", l.tip_tolerance, "mm");

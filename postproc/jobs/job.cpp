@@ -434,6 +434,7 @@ class Run {
     add(offsets.diagnostics());
     if (!tools.ok() || !offsets.ok()) return false;
     settings.tool_lengths = std::move(tools.value().lengths);
+    settings.tool_diameters = std::move(tools.value().diameters);
     settings.tool_numbers = std::move(tools.value().numbers);
     for (const auto& offset : offsets.value()) {
       nc::WorkOffset words;

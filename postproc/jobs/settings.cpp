@@ -274,11 +274,12 @@ Result<std::vector<OffsetOption>> read_offsets(const std::vector<std::string>& t
 
 namespace {
 
-/// "N=length" or "NAME:N=length".
+/// "N=length", "N=length,diameter" or "NAME:N=length".
 struct ToolOption {
   std::string name;
   int number = 0;
   double length = 0.0;
+  std::optional<double> diameter;
 };
 
 std::optional<ToolOption> read_tool(const std::string& text) {
@@ -287,12 +288,18 @@ std::optional<ToolOption> read_tool(const std::string& text) {
   const auto colon = text.rfind(':', equals);
   const std::size_t begin = colon == std::string::npos ? 0 : colon + 1;
   const auto number = read_number(text.substr(begin, equals - begin));
-  const auto length = read_number(text.substr(equals + 1));
+  const auto comma = text.find(',', equals);
+  const auto length = read_number(text.substr(equals + 1, comma - (equals + 1)));
+  std::optional<double> diameter;
+  if (comma != std::string::npos) {
+    diameter = read_number(text.substr(comma + 1));
+    if (!diameter || *diameter < 0.0 || *diameter >= 10000.0) return {};
+  }
   if (!number || !length || *number < 1 || *number != std::floor(*number) || *number > 99999 ||
       *length < 0.0 || *length > 10000.0 || colon == 0)
     return {};
   return ToolOption{colon == std::string::npos ? "" : text.substr(0, colon),
-                    static_cast<int>(*number), *length};
+                    static_cast<int>(*number), *length, diameter};
 }
 
 }  // namespace
@@ -339,11 +346,13 @@ Result<ToolTable> read_tools(const std::vector<std::string>& texts) {
     if (!tool) {
       errors.push_back(usage_error(
           "US143", "--tool " + text +
-                       ": expected is N=length or NAME:N=length, a tool number, its length in mm "
-                       "(0 to 10000), and the name that the input calls it by"));
+                       ": expected is N=length, N=length,diameter or NAME:N=length: a tool number, "
+                       "its length in mm (0 to 10000), its diameter in mm (0 to below 10000) for "
+                       "G41 and G42, and the name that the input calls it by"));
       continue;
     }
     tools.lengths[tool->number] = tool->length;
+    if (tool->diameter) tools.diameters[tool->number] = *tool->diameter;
     if (!tool->name.empty()) tools.numbers[tool->name] = tool->number;
   }
   if (!errors.empty()) return Result<ToolTable>::failure(std::move(errors));

@@ -47,13 +47,15 @@ struct OffsetOption {
 Result<std::vector<OffsetOption>> read_offsets(const std::vector<std::string>& texts,
                                                const std::string& option);
 
-/// Tools of the input: lengths (mm) by number, and the numbers of tools that it calls by a name.
+/// Tools of the input: lengths and diameters (mm) by number, and the numbers of tools that it calls
+/// by a name.
 struct ToolTable {
   std::map<int, double> lengths;
+  std::map<int, double> diameters;
   std::map<std::string, int> numbers;
 };
 
-/// --tool N=length or NAME:N=length, repeated. US143.
+/// --tool N=length, N=length,diameter or NAME:N=length, repeated. US143.
 Result<ToolTable> read_tools(const std::vector<std::string>& texts);
 
 /// --input-unit, --input-feed, --cl-frames, --cl-circles. US162 to US165.

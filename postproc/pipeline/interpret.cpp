@@ -446,6 +446,7 @@ class PathBuilder {
 nc::InterpreterSettings interpreter_settings(const InputSettings& settings) {
   nc::InterpreterSettings s;
   s.tool_lengths = settings.tool_lengths;
+  s.tool_diameters = settings.tool_diameters;
   s.integer_increment = settings.integer_unit;
   s.subroutine_folders = settings.subroutine_folders;
   s.run_budget = settings.run_budget.value_or(s.run_budget);

@@ -20,6 +20,7 @@ struct InputSettings {
   std::optional<MachineDefinition> machine;  ///< the input was posted for it
   std::optional<ProcessTable> process;       ///< in place of the machine's
   std::map<int, double> tool_lengths;        ///< mm, by tool number
+  std::map<int, double> tool_diameters;      ///< mm, by tool number
   std::map<std::string, int> tool_numbers;   ///< of tools that the input calls by a name
   std::map<int, nc::WorkOffset> work_offsets;
   std::optional<nc::InputDialect> dialect;  ///< nothing: found out when only one fits the text

@@ -152,6 +152,11 @@ TEST_CASE("radius: where the diameter is from", "[formats][nc][radius]") {
   CHECK(compensated("T3 M6\nG41\nG1 X10").sink.motions.back().end[1] == Approx(2.0));
   CHECK(compensated("G42 D3\nG1 X10").sink.motions.back().end[1] == Approx(-2.0));
   CHECK(compensated("G10 L1 P7 R3\nG41 D7\nG1 X10").sink.motions.back().end[1] == Approx(3.0));
+  nc::InterpreterSettings known = mill_settings();
+  known.tool_diameters = {{2, 5.0}};
+  const Run by_setting = run("G21 G90 F600\nG0 X0 Y0 Z5\nG41 D2\nG1 X10\nM2\n", known);
+  REQUIRE(by_setting.ok);
+  CHECK(by_setting.sink.motions.back().end[1] == Approx(2.5));
   CHECK(compensated("G41.1 D-4\nG1 X10").sink.motions.back().end[1] == Approx(-2.0));
   CHECK(compensated("G20 G41.1 D0.1\nG1 X1").sink.motions.back().end[1] == Approx(1.27));
 }

@@ -351,8 +351,16 @@ TEST_CASE("siemens: the plane of CYCLE800", "[formats][nc][siemens]") {
   }
   CHECK(errors(good + "\nTRANS\nG54\nCYCLE800(0,\"0\")\nTRAORI").empty());
   CHECK(errors(good + "\nG0 A3=1") == Codes{"NC243"});
+  // X Y and Z in blocks of their own, as posts write them: known with the last one.
+  const Run apart = siemens(swivel + "G0 X5 Y6\nZ7\nG1 Y0 F5");
+  REQUIRE(apart.ok);
+  CHECK((apart.sink.motions[0].unknown_end & 7) == 7);
+  CHECK((apart.sink.motions[1].unknown_start & 7) == 7);
+  CHECK((apart.sink.motions[1].unknown_end & 7) == 0);
+  CHECK((point(apart.sink.motions[1].end) - place(5, 6, 7)).norm() < 1e-9);
+  CHECK((point(apart.sink.motions[2].end) - place(5, 0, 7)).norm() < 1e-9);
   // After another tool length the place in the plane is not known.
-  CHECK((last(good + "\nT1 M6\nG0 X1").unknown_end & 6) == 6);
+  CHECK((last(good + "\nT1 M6\nG0 X1").unknown_end & 7) == 7);
 }
 
 }  // namespace smoothpost::test

@@ -252,12 +252,19 @@ TEST_CASE("options of people: offsets, tools, numbers", "[postproc][jobs]") {
        {"G54", "G54=", "G54=1,2", "G53=1,2,3", "G54=1,2,x", "1,2,3", "G54=1,2,3,4"})
     CHECK_FALSE(read_offsets({bad}, "--work-offset").ok());
   CHECK(read_tools({"1=60", "12=0.5"}).value().lengths.at(12) == 0.5);
+  const auto wide = read_tools({"3=60,12.5", "D6,F:4=50,6"});
+  REQUIRE(wide.ok());
+  CHECK(wide.value().lengths.at(3) == 60.0);
+  CHECK(wide.value().diameters.at(3) == 12.5);
+  CHECK(wide.value().diameters.at(4) == 6.0);
+  CHECK(wide.value().numbers.at("D6,F") == 4);
   const auto named = read_tools({"FACE MILL D50:7=80.5", "2=10"});
   REQUIRE(named.ok());
   CHECK(named.value().lengths.at(7) == 80.5);
   CHECK(named.value().numbers.at("FACE MILL D50") == 7);
   CHECK(named.value().numbers.size() == 1);
-  for (const char* bad : {"1", "=5", "x=5", "1=-3", "1.5=2", "1=1e9", ":1=5", "A:=5", "A:B=5"})
+  for (const char* bad : {"1", "=5", "x=5", "1=-3", "1.5=2", "1=1e9", ":1=5", "A:=5", "A:B=5",
+                          "1=60,", "1=60,x", "1=60,-2", "1=60,2,3", "1=,3"})
     CHECK_FALSE(read_tools({bad}).ok());
 }
 
