@@ -145,6 +145,11 @@ class Reading : public gcode::GcodeReading {
   // ---- settings
 
   bool read_setting(const Block& block) override {
+    // H is the number of the tool, where it can be.
+    const Word* tool = block.find('T');
+    if (tool != nullptr && tool->value >= 1.0 && tool->value <= 400.0 &&
+        tool->value == std::floor(tool->value))
+      spindle_tool_ = tool->value;
     if (block.has('G', 4.0)) {
       dwell(block, block.find('X'), 1.0);
       return true;
@@ -174,6 +179,15 @@ class Reading : public gcode::GcodeReading {
             "tool between two blocks");
       return true;
     }
+    const double wanted = spindle_tool_.value_or(guard_.tool() > 0 ? guard_.tool() : h->value);
+    if (h->value != wanted)
+      error(block.at, "H" + decimal_word(h->value) + " is not the length of tool " +
+                          decimal_word(wanted) + ", which is in the spindle: write H" +
+                          decimal_word(wanted));
+    if (!all_known())
+      error(block.at,
+            "tool centre point control begins before every axis has been named: where the tool "
+            "stands is not known, nor how fast the first motion is. Name them in G53 G0 before");
     centre_ = block.has('G', 43.4) ? Centre::positions : Centre::vectors;
     tool_.begin(centre_ == Centre::vectors);
     // Where the tip stands is known for one tool.
@@ -301,6 +315,7 @@ class Reading : public gcode::GcodeReading {
   bool work_offset_ = false;
   bool inverse_time_ = false;
   Centre centre_ = Centre::off;
+  std::optional<double> spindle_tool_;  // of the last T word
   gcode::ToolFollowing tool_;
   std::uint32_t unplaced_line_ = 0;
 };

@@ -159,6 +159,10 @@ class Reading : public ProgramReading {
       centre_ = false;
       reset_ = true;
     } else if (text == "FUNCTIONTCPMFTCPAXISPOSPATHCTRLVECTOR") {
+      if (!all_known())
+        error(block.at,
+              "TCPM begins before every axis has been named: where the tool stands is not known, "
+              "nor how fast the first motion is. Name them with M91 before");
       centre_ = true;
       began_ = true;
     } else if (text == "M127") {

@@ -5,6 +5,7 @@
 #include "postproc/pipeline/clearance_check.h"
 #include "postproc/pipeline/controller_blending.h"
 #include "postproc/pipeline/conversion_parts.h"
+#include "postproc/pipeline/link_check.h"
 #include "postproc/pipeline/orientation_check.h"
 #include "postproc/pipeline/path_match.h"
 #include "postproc/pipeline/process_check.h"
@@ -79,6 +80,7 @@ Checks shape_checks(const CheckInput& in, const FollowedProgram& program, const 
   ProcessNumbers process = process_numbers(read, path, in.machine);
   settings.program_process = std::move(process.program);
   settings.input_process = std::move(process.input);
+  settings.process_parts = std::move(process.parts);
   settings.event_tolerance = in.machine.tolerance.event;
   const bool whole = in.machine.recipe.task == "pose";
   if (whole) settings.whole_rotation = input_tool_rotation(chain.tool_axis, in.machine.recipe.spin);
@@ -181,6 +183,19 @@ bool follow_program(const CheckInput& in, const ScrewChain& chain, const Dialect
   return true;
 }
 
+/// What the program does besides its shape: links and the process as a whole.
+void add_program_checks(const CheckInput& in, const FollowedProgram& program,
+                        const ScrewChain& chain, Conversion& out) {
+  const auto& points = in.against->path.points;
+  LinkDepthInput links{in.machine, chain};
+  for (const PathPoint& p : points) {
+    links.tool_length = std::max(links.tool_length, p.tool_length);
+    links.beam = links.beam || p.beam;
+  }
+  out.checks.push_back(link_depth_check(program.read, links));
+  out.checks.push_back(process_complete_check(program.read, in.against->path, in.machine));
+}
+
 void tell_failed_checks(Conversion& out, const std::string& file) {
   for (const Check& c : out.checks)
     if (!c.ok)
@@ -207,6 +222,7 @@ Conversion check_program(const CheckInput& in, const Progress& progress) {
   }
   out.not_checked.push_back("feed");
   out.not_checked.push_back("process_values");
+  out.not_checked.push_back("link_path");
   const Dialect* dialect = find_dialect(in.machine.dialect.name);
   if (!dialect) {
     out.diagnostics.push_back(diagnostic(
@@ -230,6 +246,7 @@ Conversion check_program(const CheckInput& in, const Progress& progress) {
   const std::shared_ptr<const TriangleTree> tree = part ? part->shared_tree() : nullptr;
   if (in.against) {
     out.checks = shape_checks(in, program, chain, tree.get(), progress);
+    add_program_checks(in, program, chain, out);
     if (orientation_is_free(in.machine)) {
       out.assumes.push_back(
           "lead and tilt of the beam are free inside their tolerances; they are counted from the "

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "kernels/core/contract.h"
 #include "kernels/core/units.h"
+#include "postproc/pipeline/process_windows.h"
 
 namespace smoothpost {
 
@@ -23,15 +25,16 @@ struct Sample {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // of whole rotations
   std::optional<CuttingFrame> frame = {};  // of the input, where the beam is freed
   double turn = 0.0;                       // of the frame to the neighbours, rad
-  bool rapid = false;       // of the program: a rapid; of the input: a rapid may pass here
-  bool any_process = true;  // of the input: the process may be another here
+  bool rapid = false;  // of the program: a rapid; of the input: a rapid may pass here
   std::uint32_t process = 0;
+  std::int32_t window = -1;  // of the input: which processes may be here; −1: its own
 };
 
-/// Whether a program sample may stand for an input sample, wherever they are.
-bool agree(const Sample& program, const Sample& input) {
-  return (!program.rapid || input.rapid) && (input.any_process || program.process == input.process);
-}
+/// One stretch of the input between replanned segments.
+struct WantedSamples {
+  std::vector<Sample> samples;
+  std::vector<std::vector<bool>> windows;  ///< as ProcessWindows
+};
 
 /// Distances in shares of the tolerances.
 class Metric {
@@ -48,6 +51,10 @@ class Metric {
     const double turn = whole_ ? a.rotation.angularDistance(b.rotation)
                                : angle_between(a.location.axis, b.location.axis);
     return std::max((a.location.tip - b.location.tip).norm() / tip_, turn / axis_);
+  }
+  /// At most between(), whatever counts besides the tip.
+  double tips(const Sample& a, const Sample& b) const {
+    return (a.location.tip - b.location.tip).norm() / tip_;
   }
   const std::optional<Mat3>& whole() const { return whole_; }
   const FreedBeam* freed() const { return freed_; }
@@ -138,11 +145,18 @@ class ProgramSamples {
 
   /// The tip and axis at the end of move i, with a tool of that length.
   Sample at_end(std::size_t i, double tool_length) const {
-    return sample(program_.moves[i].to, tool_length, program_.moves[i].line);
+    Sample out = sample(program_.moves[i].to, tool_length, program_.moves[i].line);
+    out.process = process_.empty() ? 0 : process_[i];
+    return out;
   }
 
-  /// Samples of move i after its start.
-  std::vector<Sample> of_move(std::size_t i, double tool_length) const {
+  /// Whether move i has another process than the one before it.
+  bool process_changes(std::size_t i) const {
+    return !process_.empty() && process_[i] != process_[i - 1];
+  }
+
+  /// How many samples move i has after its start.
+  int count(std::size_t i, double tool_length) const {
     const JointVector& from = program_.moves[i - 1].to;
     const JointVector& to = program_.moves[i].to;
     auto bound = second_derivative_bound(chain_, from, to);
@@ -150,16 +164,18 @@ class ProgramSamples {
     const double bend = metric_.bend({bound.tip + tool_length * bound.axis, bound.axis});
     // Length ≤ chord + what the bend allows on either side of it.
     const double chord = metric_.between(sample(from, tool_length, 0), sample(to, tool_length, 0));
-    const int n = metric_.steps(chord + bend, bend);
-    std::vector<Sample> samples;
-    samples.reserve(static_cast<std::size_t>(n));
-    for (int k = 1; k <= n; ++k) {
-      samples.push_back(sample(from + static_cast<double>(k) / n * (to - from), tool_length,
-                               program_.moves[i].line));
-      samples.back().rapid = program_.moves[i].rapid;
-      samples.back().process = process_.empty() ? 0 : process_[i];
-    }
-    return samples;
+    return metric_.steps(chord + bend, bend);
+  }
+
+  /// Sample k of n of move i.
+  Sample of_move(std::size_t i, double tool_length, int k, int n) const {
+    const JointVector& from = program_.moves[i - 1].to;
+    const JointVector& to = program_.moves[i].to;
+    Sample out = sample(from + static_cast<double>(k) / n * (to - from), tool_length,
+                        program_.moves[i].line);
+    out.rapid = program_.moves[i].rapid;
+    out.process = process_.empty() ? 0 : process_[i];
+    return out;
   }
 
  private:
@@ -187,30 +203,30 @@ class ProgramSamples {
   const std::vector<std::uint32_t>& process_;
 };
 
-/// Marks the samples within `tolerance` along the path of a change of the process, or of an end.
-void free_around_changes(std::vector<Sample>& samples, double tolerance) {
-  const auto changes = [&samples](std::size_t i) {
-    return i == 0 || i == samples.size() || samples[i].process != samples[i - 1].process;
-  };
-  const auto step = [&samples](std::size_t i) {
-    return (samples[i].location.tip - samples[i - 1].location.tip).norm();
-  };
-  double way = 0.0;
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    way = changes(i) ? 0.0 : way + step(i);
-    samples[i].any_process = way <= tolerance;
+/// Opens the windows of a stretch; `before` and `behind`: the input's process outside of it.
+void open_windows(WantedSamples& wanted, std::uint32_t before, std::uint32_t behind,
+                  const PathMatchSettings& settings) {
+  std::vector<double> way;
+  std::vector<std::uint32_t> process;
+  for (std::size_t i = 0; i < wanted.samples.size(); ++i) {
+    way.push_back(
+        i == 0 ? 0.0
+               : way.back() +
+                     (wanted.samples[i].location.tip - wanted.samples[i - 1].location.tip).norm());
+    process.push_back(wanted.samples[i].process);
   }
-  for (std::size_t i = samples.size(); i-- > 0;) {
-    way = changes(i + 1) ? 0.0 : way + step(i + 1);
-    samples[i].any_process = samples[i].any_process || way <= tolerance;
-  }
+  ProcessWindows found = process_windows({way, process, before, behind, settings.process_parts},
+                                         settings.event_tolerance);
+  for (std::size_t i = 0; i < wanted.samples.size(); ++i) wanted.samples[i].window = found.of[i];
+  wanted.windows = std::move(found.windows);
 }
 
 /// One stretch of the input between replanned segments, as samples.
-std::vector<Sample> input_samples(const ReferencePath& input, std::size_t first, std::size_t last,
-                                  const Metric& metric, const PathMatchSettings& settings) {
+WantedSamples input_samples(const ReferencePath& input, std::size_t first, std::size_t last,
+                            const Metric& metric, const PathMatchSettings& settings) {
   const auto& points = input.path().points;
-  std::vector<Sample> samples;
+  WantedSamples wanted;
+  std::vector<Sample>& samples = wanted.samples;
   samples.push_back({points[first].location, points[first].line, points[first].rotation});
   samples.back().frame = frame_at(metric, first + 1, 0.0);
   const auto process = [&settings](std::size_t k) {
@@ -232,15 +248,16 @@ std::vector<Sample> input_samples(const ReferencePath& input, std::size_t first,
   }
   add_turns(samples);
   samples.front().rapid = samples.back().rapid = true;  // where links begin and end
-  free_around_changes(samples, settings.event_tolerance);
-  return samples;
+  if (!settings.input_process.empty())
+    open_windows(wanted, process(first), process(last + 1), settings);
+  return wanted;
 }
 
 /// The dynamic programme for one stretch; rows are program samples, columns input samples.
 class Stretch {
  public:
-  Stretch(const std::vector<Sample>& input, const Metric& metric)
-      : input_(input), metric_(metric) {}
+  Stretch(const WantedSamples& wanted, const Metric& metric)
+      : input_(wanted.samples), windows_(wanted.windows), metric_(metric) {}
 
   /// Takes the next program sample; `may_start`: the program has made only rapids since the last
   /// stretch.
@@ -285,11 +302,20 @@ class Stretch {
   std::uint32_t output_line() const { return furthest_output_; }
 
  private:
+  /// Whether a program sample may stand for an input sample, wherever they are.
+  bool agree(const Sample& program, const Sample& input) const {
+    if (program.rapid && !input.rapid) return false;
+    if (input.window < 0) return program.process == input.process;
+    const std::vector<bool>& open = windows_[static_cast<std::size_t>(input.window)];
+    return program.process < open.size() && open[program.process];
+  }
+
   double value(std::size_t j) const {
     return j >= first_ && j < first_ + row_.size() ? row_[j - first_] : kNever;
   }
 
   const std::vector<Sample>& input_;
+  const std::vector<std::vector<bool>>& windows_;
   const Metric& metric_;
   std::vector<double> row_;  ///< values of columns first_ ...
   std::size_t first_ = 0;
@@ -311,6 +337,10 @@ class Matcher {
   PathMatch run() {
     move_ = samples_.first_move();
     const auto& points = input_.path().points;
+    for (std::size_t i = 0; i < move_; ++i)
+      if (!is_free(program_.moves[i]))
+        return fail(0, program_.moves[i].line,
+                    "a feed move before the program has stated the position of every axis");
     for (std::size_t first = 0; first < points.size();) {
       std::size_t last = first;
       while (last + 1 < points.size() && !points[last + 1].replanned) ++last;
@@ -335,8 +365,9 @@ class Matcher {
 
   bool match_stretch(std::size_t first, std::size_t last) {
     const double tool_length = input_.path().points[first].tool_length;
-    const std::vector<Sample> wanted = input_samples(input_, first, last, metric_, settings_);
+    const WantedSamples wanted = input_samples(input_, first, last, metric_, settings_);
     Stretch stretch(wanted, metric_);
+    const Sample& start = wanted.samples.front();
     bool only_rapids = true;
     double best = kNever;
     std::size_t next_move = 0;
@@ -349,9 +380,22 @@ class Matcher {
         return false;
       }
       const bool rapid = is_free(program_.moves[i]);
+      const int n = samples_.count(i, tool_length);
+      // Where it starts, the process has become this move's; a stretch may begin there.
+      if (samples_.process_changes(i))
+        stretch.next(samples_.of_move(i, tool_length, 0, n), only_rapids);
       if (!rapid) only_rapids = false;
-      for (const Sample& sample : samples_.of_move(i, tool_length)) {
+      for (int k = 1; k <= n; ++k) {
+        const Sample sample = samples_.of_move(i, tool_length, k, n);
         stretch.next(sample, only_rapids);
+        if (!stretch.alive()) {
+          if (!only_rapids) break;
+          // Only its first place can bring the matching to life: what is too far from it to get
+          // there in so many steps is passed over.
+          const double far = metric_.tips(sample, start);
+          k += static_cast<int>(std::max(0.0, std::min((far - 1.0) / kStep - 1.0, 4.0e6)));
+          continue;
+        }
         // A rapid may leave the end of the stretch at any place, and lead on to the next one.
         if (rapid && stretch.finished() < kNever) {
           best = stretch.finished();
@@ -407,11 +451,11 @@ PathMatch match_paths(const ReadBack& program, const ScrewChain& chain, const Re
   require(!settings.freed || (settings.freed->lead >= settings.axis_tolerance &&
                               settings.freed->tilt >= settings.axis_tolerance),
           "a freed beam's tolerances are at least the axis'");
-  require(settings.program_process.empty() == settings.input_process.empty() &&
-              (settings.program_process.empty() ||
-               (settings.program_process.size() == program.moves.size() &&
-                settings.input_process.size() == input.path().points.size())),
-          "process numbers for every move and point");
+  require(settings.input_process.empty()
+              ? settings.program_process.empty()
+              : settings.program_process.size() == program.moves.size() &&
+                    settings.input_process.size() == input.path().points.size() + 1,
+          "process numbers for every move and point, and for the end");
   return Matcher(program, chain, input, settings, progress).run();
 }
 

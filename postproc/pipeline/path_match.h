@@ -31,9 +31,14 @@ struct PathMatchSettings {
   bool beam = false;  ///< cuts have the beam on: feeds without it are links too
   std::optional<FreedBeam> freed = {};
   /// What the process does, as equal or different numbers: during each move of the program, and on
-  /// the segment that ends at each point of the input. Both empty: not compared.
+  /// the segment that ends at each point of the input, then behind its end. Both empty: not
+  /// compared.
   std::vector<std::uint32_t> program_process = {};
   std::vector<std::uint32_t> input_process = {};
+  /// Of each of these numbers: what each of its parts (spindle, coolant, beam ...) does. Where the
+  /// process may change off its place, every part may be as it is on either side. Empty: a number
+  /// is one part.
+  std::vector<std::vector<std::uint32_t>> process_parts = {};
   double event_tolerance = 0.0;  ///< mm along the input, where the process may change off its place
 };
 
@@ -63,11 +68,11 @@ struct PathMatch {
 /// program may have rapids (with settings.beam also feeds without beam) that the input does not
 /// have: before it, after it, and where the input's own way is replanned. Feeds of the input are
 /// matched by feeds only, and with the process as it is there; around its changes and the ends of
-/// cuts, within event_tolerance, it may be another. A feed move that matches
-/// nothing, a dropped or a doubled block end the matching. `chain` is the program's machine with
-/// tool length 0 and the part placed. @pre process numbers for every move and point, or none. Cost:
-/// linear in the path length over the tolerance; memory: the band and the samples of one segment
-/// run.
+/// cuts, within event_tolerance, each part of it may be as on either side of the change. A feed
+/// move that matches nothing (also one before the program has stated every axis), a dropped or a
+/// doubled block end the matching. `chain` is the program's machine with tool length 0 and the part
+/// placed. @pre process numbers for every move and point and the end, or none. Cost: linear in the
+/// path length over the tolerance; memory: the band and the samples of one segment run.
 PathMatch match_paths(const ReadBack& program, const ScrewChain& chain, const ReferencePath& input,
                       const PathMatchSettings& settings, const Progress& progress);
 

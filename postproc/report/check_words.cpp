@@ -40,6 +40,9 @@ constexpr std::array kChecks = {
     Row{"tip_held", "how far the tip leaves its point while an axis swings"},
     Row{"process_as_programmed",
         "cuts that start with another spindle, coolant, gas or power state"},
+    Row{"process_complete",
+        "states left on at the end, and stretches with the beam on too many or missing"},
+    Row{"link_depth", "how deep the tool goes between two cuts, below both of their ends"},
     Row{"event_position", "how far along the path the beam may change off its place"},
     Row{"beam_off_in_rapid", "rapids with the beam on"},
     Row{"beam_off_in_link", "motions between cuts with the beam on"},
@@ -74,6 +77,9 @@ constexpr std::array kUnchecked = {
     Row{"process_values",
         "Values of events, such as spindle speed and tool number, and waits and stops were not "
         "compared with the input's."},
+    Row{"link_path",
+        "The ways between cuts were not compared with the input's: of them the axes' ranges, the "
+        "beam and their depth were checked."},
 };
 
 template <typename Table>

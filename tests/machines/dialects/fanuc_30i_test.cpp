@@ -191,6 +191,7 @@ TEST_CASE("fanuc_30i: what could move differently than certified is refused",
       {" P1\n", " P0\n"},  // no posture control
       {" P1\n", "\n"},
       {" G43.4 H1", " G43 H1"},
+      {" G43.4 H1", " G43.4 H2"},  // the length of another tool
       {" G61\n", " G64\n"},  // blends
       {" G90 ", " G91 "},
       {"G21 ", ""},
