@@ -29,6 +29,7 @@ struct Outcome {
   std::string report;
   std::string messages;
   std::string status;
+  bool cancelled = false;
 };
 
 std::vector<std::string> lines_of(const std::string& text) {
@@ -100,7 +101,10 @@ Outcome run_case(const Case& c, const Progress& progress) {
   const JobResult result = run_job(options, progress);
   outcome.program = result.program;
   outcome.report = result.report;
-  for (const auto& d : result.diagnostics) outcome.messages += to_string(d) + "\n";
+  for (const auto& d : result.diagnostics) {
+    outcome.messages += to_string(d) + "\n";
+    outcome.cancelled = outcome.cancelled || d.code == "US190";
+  }
   outcome.status = std::to_string(static_cast<int>(result.status)) + "\n";
   return outcome;
 }
@@ -209,6 +213,13 @@ JobResult run_golden_command(const Options& options, const Progress& progress) {
       continue;
     }
     const Outcome now = run_case(c.value(), progress);
+    if (now.cancelled) {
+      result.diagnostics.push_back(usage_error(
+          "US190",
+          "cancelled at " + c.value().name + "; it and the cases behind it stay as they are"));
+      result.status = status_of(result.diagnostics);
+      return result;
+    }
     if (words[0] == "update") {
       const auto errors = update(c.value(), now);
       result.diagnostics.insert(result.diagnostics.end(), errors.begin(), errors.end());

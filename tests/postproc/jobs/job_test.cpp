@@ -313,4 +313,14 @@ TEST_CASE("golden: a changed program, check, message or status is found", "[post
   CHECK(spoil("expected.exit", "0", "3").find("exit status") != std::string::npos);
   CHECK(spoil("expected.messages", "note", "warning").find("messages:") != std::string::npos);
   CHECK(status(run_job(o, {})) == 0);
+
+  // An update that is interrupted leaves what is stored.
+  const std::string stored = test::read_bytes(c / "expected.program");
+  o.arguments = {"update", folder.string()};
+  const JobResult interrupted = run_job(o, {[](const char*, double) { return false; }});
+  CHECK(status(interrupted) != 0);
+  CHECK(test::read_bytes(c / "expected.program") == stored);
+  CHECK(test::read_bytes(c / "expected.exit") == "0\n");
+  o.arguments = {"run", folder.string()};
+  CHECK(status(run_job(o, {})) == 0);
 }
