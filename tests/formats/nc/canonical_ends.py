@@ -67,6 +67,9 @@ class Canon:
         lengths = [value * INCH for value in (first, second, centre_first, centre_second)]
         show("ARC_FEED", [*lengths, turns, along * INCH, *rest[:3]])
 
+    def rigid_tap(self, x, y, z):
+        show("RIGID_TAP", [value * INCH for value in (x, y, z)])
+
     def set_feed_rate(self, rate):
         show("SET_FEED_RATE", [rate * INCH])
 

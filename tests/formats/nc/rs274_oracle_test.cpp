@@ -212,7 +212,7 @@ std::optional<OracleRun> run_fine_oracle() {
                     status);
   constexpr int kNoModule = 77, kNoProgram = 127;
   if (status == kNoModule || status == kNoProgram) return std::nullopt;
-  run.digit = 1e-6;
+  run.digit = 2e-6;
   return run;
 }
 
