@@ -184,6 +184,11 @@ void Executor::planned(const BlockWords& block) {
 void Executor::act(const BlockWords& block, const BlockPlan& plan) {
   if (block.comment_piece != BlockWords::kNone) comment(block);
   if (radius_.is_on()) check_under_compensation(block, plan);
+  if (radius_.stands_beside() && block.has_m(6)) {
+    AxisWords place = coordinates_.world();
+    radius_.forget_contour(place);
+    coordinates_.move_to(place, coordinates_.unknown());
+  }
   if (!is_linuxcnc()) {
     set_units(block);
     warn_dialect(block);

@@ -57,6 +57,14 @@ class RadiusCompensation final : public CanonicalSink {
   /// It has ended, and no motion has come since.
   bool stands_beside() const { return beside_contour_ && !on_; }
 
+  /// A tool change behind G40: LinuxCNC asks the machine where it stands then, and forgets where
+  /// the contour ended. `place` becomes where the centre is, in the plane.   @pre stands_beside()
+  void forget_contour(AxisWords& place) {
+    place[plane_.first] = stands_.x();
+    place[plane_.second] = stands_.y();
+    beside_contour_ = false;
+  }
+
   void motion(const CanonicalMotion& motion) override;
   void dwell(double seconds, std::uint32_t line) override;
   void event(const ProcessEvent& event) override;

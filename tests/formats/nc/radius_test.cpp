@@ -147,6 +147,21 @@ TEST_CASE("radius: what the tool does not fit into is refused with its line",
   }
 }
 
+TEST_CASE("radius: a tool change behind G40 forgets where the contour ended",
+          "[formats][nc][radius]") {
+  const std::string cut = "G21 F100\nG0 X0 Y0 Z0\nG41.1 D4\nG1 X10\nY10\nG40\n";
+  const auto last_end = [&](const std::string& lines) {
+    const Run r = run_lines(cut + lines, mill_settings());
+    REQUIRE(r.ok);
+    return r.sink.motions.back().end;
+  };
+  // The centre is left of X10 Y10 by 2. Without a change Z alone goes back onto the contour's end.
+  CHECK(last_end("G0 Z5")[0] == Approx(10.0));
+  CHECK(last_end("T1 M6\nG0 Z5")[0] == Approx(8.0));
+  CHECK(last_end("T1 M6\nG0 X50")[1] == Approx(10.0));
+  CHECK(last_end("G91\nT1 M6\nG0 X1")[0] == Approx(9.0));
+}
+
 TEST_CASE("radius: where the diameter is from", "[formats][nc][radius]") {
   CHECK(compensated("G41 D0\nG1 X10").sink.motions.back().end[1] == 0.0);
   CHECK(compensated("T3 M6\nG41\nG1 X10").sink.motions.back().end[1] == Approx(2.0));

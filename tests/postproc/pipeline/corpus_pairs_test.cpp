@@ -38,12 +38,11 @@ InterpretedInput read_file(const std::filesystem::path& path, const char* format
 /// machine coordinates and, of the post's copy, moves that change no printed decimal are left out.
 std::vector<Step> steps_of(const ToolPath& path, const Vec3& axis, const Mat3& turn) {
   std::vector<Step> steps;
-  for (std::size_t i = 1; i < path.points.size(); ++i) {
-    const PathPoint& p = path.points[i];
+  for (const PathPoint& p : path.points) {
     if ((p.location.axis - axis).norm() > 1e-6) continue;
     Step step{turn * p.location.tip, p.kind == MotionKind::rapid, p.is_arc, p.line};
-    const bool moves = steps.empty() || step.arc ||
-                       (step.end - steps.back().end).cwiseAbs().maxCoeff() >= 0.001;
+    const bool moves =
+        steps.empty() || step.arc || (step.end - steps.back().end).cwiseAbs().maxCoeff() >= 0.001;
     if (moves) steps.push_back(step);
   }
   return steps;
@@ -91,20 +90,19 @@ TEST_CASE("corpus: boss.apt and the programs that a post made of it are the same
     return;
   }
   const InterpretedInput cl = read_file(*folder / "parts-tools/boss.apt", "cl");
-  Mat3 second;  // x y z of the second setup are Y Z X of the part
-  second << 0, 1, 0, 0, 0, 1, 1, 0, 0;
+  Mat3 second;  // x y z of the second setup are −Z Y X of the part
+  second << 0, 0, -1, 0, 1, 0, 1, 0, 0;
   struct Setup {
     const char* file;
     Vec3 axis;
     Mat3 turn;
   };
-  for (const Setup& setup : {Setup{"11.h", Vec3::UnitZ(), Mat3::Identity()},
-                             Setup{"12.h", Vec3::UnitX(), second}}) {
+  for (const Setup& setup :
+       {Setup{"11.h", Vec3::UnitZ(), Mat3::Identity()}, Setup{"12.h", Vec3::UnitX(), second}}) {
     const InterpretedInput posted =
         read_file(*folder / "tests/parts-tools/boss" / setup.file, "nc");
-    const Difference d =
-        difference(steps_of(cl.path, setup.axis, setup.turn),
-                   steps_of(posted.path, Vec3::UnitZ(), Mat3::Identity()));
+    const Difference d = difference(steps_of(cl.path, setup.axis, setup.turn),
+                                    steps_of(posted.path, Vec3::UnitZ(), Mat3::Identity()));
     INFO(setup.file << ": " << d.first);
     WARN(setup.file << ": " << d.compared << " motions, " << d.arcs << " arcs, " << d.rapids
                     << " rapids; ends differ by " << d.sum / static_cast<double>(d.compared)
