@@ -10,28 +10,7 @@ namespace smoothpost {
 namespace {
 
 using test::Random;
-
-/// A chain with any mixture of joints on both sides, frames and a tool that are nowhere aligned.
-ScrewChain random_chain(Random& random, int joints) {
-  ScrewChain chain;
-  for (int i = 0; i < joints; ++i) {
-    ChainJoint joint;
-    joint.kind = random.below(2) == 0 ? JointKind::linear : JointKind::rotary;
-    joint.side = random.below(2) == 0 ? ChainSide::tool : ChainSide::workpiece;
-    joint.direction = random.unit();
-    joint.origin = 300.0 * random.unit();
-    const double range = joint.kind == JointKind::linear ? 500.0 : 3.0;
-    joint.lower = -range;
-    joint.upper = range;
-    chain.joints.push_back(joint);
-  }
-  chain.workpiece_home.linear() = rotation_exp(random.between(0.0, 3.0) * random.unit());
-  chain.workpiece_home.translation() = 100.0 * random.unit();
-  chain.tool_home.linear() = rotation_exp(random.between(0.0, 3.0) * random.unit());
-  chain.tool_home.translation() = 200.0 * random.unit();
-  chain.tool_axis = random.unit();
-  return chain;
-}
+using test::random_chain;
 
 TEST_CASE("bent_motion_bound: never below dense second differences", "[kernels][kinematics]") {
   Random random(16);
