@@ -16,8 +16,7 @@ constexpr std::size_t kCore = 600;       // elements of a part that it shares wi
 constexpr std::size_t kOverlap = 100;    // beyond its core, each way
 constexpr std::size_t kBlend = 12;       // controls over which laws change
 constexpr std::size_t kEndControls = 8;  // of a part, that are not trusted
-constexpr double kApart = 1e-4;          // relative
-constexpr double kEndShare = 0.5;        // of the largest constant b, at the ends of a part
+constexpr double kApart = 1e-3;          // relative; what is left, mend_law() mends
 constexpr std::size_t kReach = 24;       // elements that are mended with one
 constexpr std::size_t kWiden = 4;        // times, where that is not enough
 constexpr int kHeld = 3;                 // controls that join what is mended to the rest
@@ -63,29 +62,12 @@ void solve_part(const FeedProgram& whole, const FeedPartsSettings& settings, Fee
     cut(whole, part.first, part.end, own);
     program = &own.program;
   }
-  const double slow = kEndShare * constant_law(*program);
-  const bool from_start = part.first == 0;
-  const bool to_end = part.end == whole.grid->elements.size();
-  const auto hold_ends = [&](std::vector<double> law) {
-    if (!from_start) law[0] = law[1] = slow;
-    if (!to_end) law[law.size() - 1] = law[law.size() - 2] = slow;
-    return law;
-  };
-  if (!from_start) own.program.fixed_first = 2;
-  if (!to_end) own.program.fixed_last = 2;
-  FeedSolution solution = solve_feed(
-      *program, hold_ends(local_law(*program, from_start ? 0.0 : slow, to_end ? 0.0 : slow)),
-      settings.solver);
+  if (part.first > 0) own.program.fixed_first = 2;
+  if (part.end < whole.grid->elements.size()) own.program.fixed_last = 2;
+  std::vector<double> start = local_law(*program);
+  FeedSolution solution = solve_feed(*program, start, settings.solver);
   part.iterations = solution.iterations;
-  if (!solution.converged && settings.retry) {
-    const auto controls = static_cast<std::size_t>(program->grid->controls());
-    FeedSolution again =
-        solve_feed(*program, hold_ends(std::vector<double>(controls, slow)), settings.solver);
-    part.iterations += again.iterations;
-    if (again.converged || (again.feasible && again.time < solution.time))
-      solution = std::move(again);
-  }
-  part.controls = std::move(solution.controls);
+  part.controls = std::move(solution.feasible ? solution.controls : start);
   part.converged = solution.converged;
 }
 
@@ -285,7 +267,8 @@ FeedParts solve_in_parts(const FeedProgram& program, const FeedPartsSettings& se
   }
   std::vector<bool> wanted(parts, true);
   solve_all(program, wanted, settings, all.parts);
-  while (settings.join && join_parts(all.parts, wanted))
+  const auto going = [&] { return !program.going || (*program.going)(); };
+  while (settings.join && going() && join_parts(all.parts, wanted))
     solve_all(program, wanted, settings, all.parts);
   put_together(program, all);
   return all;

@@ -10,9 +10,8 @@ namespace smoothpost {
 
 struct FeedPartsSettings {
   FeedSolverSettings solver;
-  bool join = true;   ///< solve parts that do not meet as one; false: change over where they are
-                      ///< nearest
-  bool retry = true;  ///< a part that does not converge once more, from a constant law
+  bool join = true;  ///< solve parts that do not meet as one; false: change over where they are
+                     ///< nearest
 };
 
 /// A run of elements that was solved by itself.
@@ -31,11 +30,11 @@ struct FeedParts {
 };
 
 /// Solves a programme from rest to rest from its local_law(), in parts of about 600
-/// elements that share 200 with each neighbour. A part starts and ends slowly where the path goes
-/// on: two controls there are half of the largest b that is possible as a constant on it, so it
-/// always has a law. Behind the next bottleneck such a law is that of the whole: between two parts
-/// the law changes from one to the other (with a C² weight over 12 controls) where they are
-/// nearest. Parts that differ by more than 1e-4 everywhere are solved as one.
+/// elements that share 200 with each neighbour. Where the path goes on, two controls of a part stay
+/// as that law has them: it breaks no row, so a part always has a law. Behind the next bottleneck
+/// such a law is that of the whole: between two parts the law changes from one to the other (with a
+/// C² weight over 12 controls) where they are nearest. Parts that differ by more than 1e-3
+/// everywhere are solved as one. A part whose solve ends outside of its rows keeps its local_law().
 ///
 /// An interior point takes as many iterations as its worst place and its widest range of feeds
 /// need; in parts, the rest does not pay for that. Guarantee (test): the law of the whole, to 1e-4

@@ -98,14 +98,12 @@ std::vector<double> controls_of(const std::vector<double>& values, std::size_t c
 
 }  // namespace
 
-std::vector<double> local_law(const FeedProgram& program, double start, double end) {
+std::vector<double> local_law(const FeedProgram& program) {
   const FeedGrid& grid = *program.grid;
   const std::vector<ElementBounds> bounds = element_bounds(program);
   std::vector<double> values;
   values.reserve(bounds.size());
   for (const ElementBounds& bound : bounds) values.push_back(kConstantShare * bound.constant);
-  if (start > 0.0) values.front() = std::min(values.front(), start);
-  if (end > 0.0) values.back() = std::min(values.back(), end);
   sweep(grid, bounds, false, values);
   sweep(grid, bounds, true, values);
   return keep_inside(program, controls_of(values, static_cast<std::size_t>(grid.controls())));

@@ -12,8 +12,7 @@ namespace smoothpost {
 /// accelerations and jerks allows (one sweep each way), smoothed. Unlike one constant for the whole
 /// path it is within a small factor of the optimum where feeds differ by powers of ten.
 /// Breaks no row.   Cost: linear, a few iterations.
-/// `start` and `end`, unless 0: b there at most.
-std::vector<double> local_law(const FeedProgram& program, double start = 0.0, double end = 0.0);
+std::vector<double> local_law(const FeedProgram& program);
 
 /// Lowers b about the points whose rows it breaks, a few times, and at last everywhere by what is
 /// left: the result breaks no row.   @pre b > 0 at every point   Cost: up to 10 evaluations.

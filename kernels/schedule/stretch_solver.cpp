@@ -14,6 +14,8 @@ constexpr int kCoarsePoints = 5;
 constexpr int kLeastCoarse = 20;
 constexpr double kFirstShare = 0.5;  // of the largest constant b, at the start
 constexpr double kCoarseGap = 1e-3, kFineGap = 1e-4, kLastGap = 1e-5;  // of solves, relative to T
+constexpr int kCoarseIterations = 40;   // its law only says where elements are wanted
+constexpr int kFineIterations = 400;    // 60 to 180 on paths of very uneven feeds
 constexpr double kMostFiner = 40.0;     // fine elements a coarse one, in the mean
 constexpr double kTightEnough = 1.001;  // dilation after which nothing is drawn in again
 constexpr double kMended =
@@ -202,7 +204,7 @@ StretchLaw solve_coarse(const FeedStretch& stretch, const MovingEnds& ends,
     fix_ends(program, ends, start);
     solution = solve_feed(program, std::move(start), {1e-5, 80});
   } else {
-    solution = solve_in_parts(program, {{kCoarseGap, 40}, false, false}).solution;
+    solution = solve_in_parts(program, {{kCoarseGap, kCoarseIterations}, false}).solution;
   }
   law.controls = std::move(solution.controls);
   law.time = solution.time;
@@ -264,7 +266,7 @@ StretchLaw solve_resting(const FeedStretch& stretch, const StretchSettings& sett
     law.grid = feed_grid(stretch, fine_elements(stretch, coarse, settings), settings.points, true);
   }
   FeedProgram program = make_program(stretch, law.grid, settings);
-  FeedSolution solution = solve_in_parts(program, {{kFineGap}}).solution;
+  FeedSolution solution = solve_in_parts(program, {{kFineGap, kFineIterations}}).solution;
   law.iterations += solution.iterations;
   law.controls = solution.controls;
   law.time = solution.time;
