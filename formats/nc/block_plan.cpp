@@ -199,7 +199,7 @@ LetterMask BlockPlanner::letters_of_motion(const BlockWords& block) const {
   if (plan_.motion == 52) return letter_bit('P') | letter_bit('L');
   if (is_spline(plan_.motion)) return letter_bit('P') | letter_bit('Q');
   const GCode cycle = plan_.motion;
-  if (cycle == 330 || cycle == 331) return 0;
+  if (cycle == 330 || cycle == 331 || is_probe(cycle)) return 0;
   LetterMask used = letter_bit('R') | letter_bit('L');
   if (cycle == 760) {
     used |= letter_bit('P') | letter_bit('Q') | letter_bit('H') | letter_bit('E');

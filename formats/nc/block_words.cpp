@@ -9,7 +9,7 @@
 namespace smoothpost::nc {
 
 const BlockWords& BlockReader::read(std::size_t index) {
-  const Block& block = program_->blocks[index];
+  const Block& block = program_->block(index);
   block_.line = static_cast<std::uint32_t>(index) + 1;
   block_.input_line = input_line_ == 0 ? block_.line : input_line_;
   block_.letters = block_.absolute = block_.incremental = 0;
@@ -59,7 +59,15 @@ const BlockWords& BlockReader::read(std::size_t index) {
     }
   }
   if (assigns) values_.finish_block(!block_.bad);
+  if (block_.has('X')) halve_diameter();
   return block_;
+}
+
+/// G7 and G8 count for the X word of their own block too, wherever they stand in it.
+void BlockReader::halve_diameter() {
+  const GCode mode = block_.code(GGroup::lathe_diameter);
+  if (mode == kNoCode ? values_.diameter() : mode == 70)
+    block_.value[static_cast<std::size_t>(letter_index('X'))] *= 0.5;
 }
 
 /// The parser has kept what is wrong behind the end of the program for a subroutine that is called.
@@ -254,6 +262,11 @@ bool BlockReader::is_g_allowed(const GCodeInfo& info, GCode code, std::uint32_t 
            g_code_text(code) + " (" + info.name +
                ") ties the feed to the turning of the spindle, which the planned motion does not "
                "follow; let the CAM post write G94 feeds, or keep this operation on its control",
+           index);
+  } else if (is_probe(code) && settings_.plain_blocks) {
+    refuse("NC202",
+           g_code_text(code) + " (" + info.name +
+               ") stops where the probe says, which a machine program of planned motions does not",
            index);
   } else if (info.status == GStatus::expanded && settings_.plain_blocks) {
     refuse("NC202",

@@ -92,6 +92,8 @@ class WordValues {
   virtual void finish_block(bool good) = 0;
   /// G20 is active.
   virtual bool inch() const = 0;
+  /// X words are diameters.
+  virtual bool diameter() const { return false; }
   /// A canned cycle is active.
   virtual bool in_cycle() const { return false; }
   /// The value at the start of `text`, of a line of program flow.
@@ -129,7 +131,7 @@ class BlockReader {
   }
   const Program& program() const { return *program_; }
 
-  /// @pre index < program.blocks.size(). Valid until the next call.
+  /// @pre program.holds(index). Valid until the next call.
   const BlockWords& read(std::size_t index);
 
   InputDialect dialect() const { return program_->dialect; }
@@ -162,6 +164,7 @@ class BlockReader {
   bool is_g_allowed(const GCodeInfo& info, GCode code, std::uint32_t index);
   void add_g(double value, std::uint32_t index);
   void add_m(double value, std::uint32_t index);
+  void halve_diameter();
   void refuse(const char* code, std::string text, std::uint32_t piece);
 
   const Program* program_;

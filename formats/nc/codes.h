@@ -47,7 +47,7 @@ inline constexpr int kGGroups = 16;
 enum class GStatus : std::uint8_t {
   unknown,       ///< no code of this language
   read,          ///< has its meaning here
-  expanded,      ///< read as the motions that it stands for: cycles, splines; macro calls
+  expanded,      ///< read as the motions that it stands for: cycles, splines, probing; macro calls
   later,         ///< a code of this language that a later version reads
   synchronised,  ///< feed by the turning of the spindle
   tcp            ///< tool-centre-point or tilted-plane mode of another controller
@@ -86,6 +86,8 @@ inline bool is_cycle(GCode code) {
 }
 /// G33, G33.1, G76.
 inline bool is_synchronised(GCode code) { return code == 330 || code == 331 || code == 760; }
+/// G38.2 to G38.5.
+inline bool is_probe(GCode code) { return code >= 382 && code <= 385; }
 /// CIP, CT, POLY.
 inline bool is_named_motion(GCode code) { return code >= kPolynomial; }
 /// G5, G5.1, G5.2.

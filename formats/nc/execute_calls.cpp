@@ -84,7 +84,7 @@ bool Executor::enter(ProgramUnit& unit, CallFrame frame) {
   frame.caller_end = range_end_;
   const bool part = frame.style == CallFrame::Style::part;
   run_within(part || is_siemens() ? frame.entry : 0,
-             frame.end != 0 ? frame.end : unit.program->blocks.size());
+             frame.end != 0 ? frame.end : unit.program->block_count);
   if (!part) values_->enter_call(frame.scope);
   frames_.push_back(std::move(frame));
   place_.call_level = static_cast<int>(frames_.size()) - 1;

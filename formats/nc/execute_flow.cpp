@@ -3,6 +3,7 @@
 
 #include "formats/nc/executor.h"
 #include "formats/nc/number_text.h"
+#include "kernels/core/contract.h"
 
 // Lines of program flow: loops, branches, jumps. Calls are in execute_calls.cpp.
 namespace smoothpost::nc {
@@ -10,6 +11,7 @@ namespace smoothpost::nc {
 using Kind = FlowKind;
 
 FlowIndex& Executor::index_of(ProgramUnit& unit) {
+  require(unit.program->is_whole(), "the flow of a whole program");
   if (!unit.index) unit.index = index_flow(*unit.program);
   return *unit.index;
 }
@@ -25,8 +27,7 @@ void Executor::tell_flow_faults(ProgramUnit& unit) {
 
 TextPlace Executor::flow_place(const FlowStatement& statement, std::size_t offset) const {
   const Program& program = *unit_->program;
-  const std::uint32_t line_begin =
-      program.pieces[program.blocks[statement.block].first_piece].begin;
+  const std::uint32_t line_begin = program.pieces[program.block(statement.block).first_piece].begin;
   const std::uint32_t begin = program.pieces[statement.piece].begin - line_begin;
   return {statement.block + 1, begin + static_cast<std::uint32_t>(offset) + 1};
 }

@@ -101,6 +101,7 @@ void Executor::begin_motion(const BlockWords& block, const BlockPlan& plan) {
   motion_.line = block.input_line;
   motion_.duration = 0.0;
   motion_.pitch = 0.0;
+  motion_.probe = false;
   motion_.start = coordinates_.world();
   motion_.column = reader_.input_place(block, block.first_piece).column;
   motion_.axis_vector = modal_.swivelled;
@@ -184,10 +185,12 @@ void Executor::change_mode(GCode mode, const BlockWords& block) {
 void Executor::expanded_motion(const BlockWords& block, const BlockPlan& plan, GCode before) {
   if (radius_.stands_beside())
     return error("NC264",
-                 "the first motion behind G40 is a cycle, spline or thread; write G0 or G1 before",
+                 "the first motion behind G40 is a cycle, spline, thread or probing motion; write "
+                 "G0 or G1 before",
                  block, block.first_piece);
   if (is_cycle(plan.motion)) return cycle(block, plan, before);
   if (is_synchronised(plan.motion)) return synchronised(block, plan);
+  if (is_probe(plan.motion)) return probe(block, plan);
   if (is_spline(plan.motion)) spline(block, plan, before);
 }
 

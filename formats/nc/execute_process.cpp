@@ -159,7 +159,7 @@ void Executor::comment_words(const BlockWords& block, const ProcessAction& actio
   const GCode code = block.code(GGroup::non_modal);
   const bool whole = planner_.current().whole_comment;
   std::string text = "unmapped:";
-  const Block& span = reader_.program().blocks[block.line - 1];
+  const Block& span = reader_.program().block(block.line - 1);
   for (std::uint32_t i = span.first_piece; i < span.first_piece + span.piece_count; ++i) {
     const Piece& piece = reader_.program().pieces[i];
     if (piece.kind != PieceKind::word) continue;

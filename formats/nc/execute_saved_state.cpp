@@ -29,6 +29,7 @@ void Executor::save_state(bool restores) {
   saved.inverse_time = modal_.inverse_time;
   saved.per_turn = modal_.per_turn;
   saved.retract_to_old = modal_.retract_to_old;
+  saved.diameter = modal_.diameter;
   saved.linear_feed = modal_.linear_feed;
   saved.angular_feed = modal_.angular_feed;
   saved.speed = modal_.words.speed;
@@ -57,6 +58,7 @@ void Executor::restore_state(const SavedState& saved, const BlockWords& block) {
   modal_.inverse_time = saved.inverse_time;
   modal_.per_turn = saved.per_turn;
   modal_.retract_to_old = saved.retract_to_old;
+  modal_.diameter = saved.diameter;
   modal_.linear_feed = saved.linear_feed;
   modal_.angular_feed = saved.angular_feed;
   if (saved.system != coordinates_.system()) {

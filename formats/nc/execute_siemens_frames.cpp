@@ -306,7 +306,7 @@ std::vector<std::uint32_t> Executor::statements_of(const BlockWords& block,
                                                    SiemensWord word) const {
   std::vector<std::uint32_t> out;
   const Program& program = reader_.program();
-  const Block& span = program.blocks[block.line - 1];
+  const Block& span = program.block(block.line - 1);
   for (std::uint32_t i = span.first_piece; i < span.first_piece + span.piece_count; ++i) {
     const Piece& piece = program.pieces[i];
     if (piece.kind == PieceKind::statement && piece.detail == static_cast<std::uint8_t>(word))

@@ -94,9 +94,10 @@ std::string Executor::thread(const BlockWords& block, const BlockPlan& plan) {
   };
   Thread t;
   t.pitch = word('P', 0.0) * modal_.unit;
-  t.peak = word('I', 0.0) * modal_.unit;
-  t.first_depth = word('J', 0.0) * modal_.unit;
-  t.depth = word('K', 0.0) * modal_.unit;
+  const double across = modal_.diameter ? 0.5 * modal_.unit : modal_.unit;
+  t.peak = word('I', 0.0) * across;
+  t.first_depth = word('J', 0.0) * across;
+  t.depth = word('K', 0.0) * across;
   t.degression = word('R', 1.0);
   const double angle = word('Q', 0.0);
   t.slope = std::tan(radians_from_degrees(angle));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "kernels/core/contract.h"
 #include "kernels/core/units.h"
 
 namespace smoothpost::nc {
@@ -32,7 +33,7 @@ std::uint64_t cost_of(const Program& program, const Block& block) {
 }  // namespace
 
 Executor::Executor(const Program& program, const InterpreterSettings& settings,
-                   const EventMatcher& matcher, CanonicalSink& sink)
+                   const EventMatcher& matcher, CanonicalSink& sink, ProgramStream* stream)
     : dialect_(program.dialect),
       settings_(settings),
       matcher_(matcher),
@@ -49,7 +50,8 @@ Executor::Executor(const Program& program, const InterpreterSettings& settings,
                           {coordinates_, modal_, first_home_, second_home_, tools_, place_})),
       reader_(program, settings, *values_, log_),
       planner_(settings, matcher, reader_, log_),
-      systems_used_(kWorkSystems + 1, false) {
+      systems_used_(kWorkSystems + 1, false),
+      stream_(stream) {
   modal_.unit = modal_.feed_unit = settings.inch_default ? kMillimetresPerInch : 1.0;
   // The motion mode after reset; RS274NGC has none.
   if (!is_linuxcnc()) modal_.motion = is_siemens() ? 10 : 0;
@@ -58,12 +60,11 @@ Executor::Executor(const Program& program, const InterpreterSettings& settings,
   units_.push_back(std::make_unique<ProgramUnit>());
   unit_ = units_.back().get();
   unit_->program = &program;
-  run_within(0, program.blocks.size());
+  run_within(0, program.block_count);
   frames_.emplace_back();
   // What the program costs when every block runs once.
   constexpr std::uint64_t kMost = std::uint64_t{1} << 60;
-  budget_ =
-      std::min(settings.run_budget, kMost) + program.blocks.size() + program.text.size() / 256;
+  budget_ = std::min(settings.run_budget, kMost) + program.block_count + program.text.size() / 256;
 }
 
 Result<InterpretationSummary> Executor::run() {
@@ -79,7 +80,7 @@ Result<InterpretationSummary> Executor::run() {
   }
   if (!control_points_.empty() && !stopped_) {
     stop("NC262", "the spline (G5.2) has no end: G5.3 is missing",
-         {static_cast<std::uint32_t>(program.blocks.size()), 1});
+         {static_cast<std::uint32_t>(program.block_count), 1});
   }
   if (!summary_.ended && !stopped_) {
     log_.warning("NC229",
@@ -87,7 +88,7 @@ Result<InterpretationSummary> Executor::run() {
                      ? "the program ends without M2, M30 or a closing %: it is read to its last "
                        "line, but LinuxCNC refuses such a file"
                      : "the program ends without M2 or M30: it is read to its last line",
-                 {static_cast<std::uint32_t>(program.blocks.size()), 0});
+                 {static_cast<std::uint32_t>(program.block_count), 0});
   }
   if (log_.has_error()) return Result<InterpretationSummary>::failure(log_.take());
   for (const auto& unit : units_)
@@ -96,13 +97,24 @@ Result<InterpretationSummary> Executor::run() {
   return {std::move(summary_), log_.take()};
 }
 
+/// A block of the text that is run. Blocks before the window are gone: of a program that comes back
+/// to them the window is the whole text.
+const Block& Executor::reach(std::size_t index) {
+  const Program& program = *unit_->program;
+  while (!program.holds(index)) {
+    require(stream_ != nullptr && index >= program.first_block && stream_->next(),
+            "the run goes forward through the windows of its program");
+  }
+  return program.block(index);
+}
+
 /// Runs the next block; false: there is none.
 bool Executor::run_block() {
-  const Program& program = *unit_->program;
   if (place_.next >= range_end_ || place_.next < range_begin_) return leave_range();
   const std::size_t index = place_.next++;
-  if (skipped(index)) return true;
-  const std::uint64_t cost = cost_of(program, program.blocks[index]);
+  const Block& next = reach(index);
+  if (skipped(next)) return true;
+  const std::uint64_t cost = cost_of(*unit_->program, next);
   if (cost > budget_) {
     spend(cost, {static_cast<std::uint32_t>(index) + 1, 1});
     return false;
@@ -145,10 +157,9 @@ void Executor::stop(const char* code, std::string text, TextPlace place) {
   stopped_ = true;
 }
 
-bool Executor::skipped(std::size_t index) const {
+bool Executor::skipped(const Block& block) const {
   if (settings_.execute_deleted) return false;
   const Program& program = *unit_->program;
-  const Block& block = program.blocks[index];
   for (std::uint32_t i = 0; i < block.piece_count && i < 2; ++i) {
     if (program.pieces[block.first_piece + i].kind == PieceKind::block_delete) return true;
   }
@@ -272,6 +283,8 @@ void Executor::set_modes(const BlockWords& block) {
   if (arc_distance != kNoCode) modal_.arc_absolute = arc_distance == 901;
   const GCode retract = block.code(GGroup::retract);
   if (retract != kNoCode) modal_.retract_to_old = retract == 980;
+  const GCode lathe = block.code(GGroup::lathe_diameter);
+  if (lathe != kNoCode) modal_.diameter = lathe == 70;
 }
 
 /// After a refused block: takes over what can be told from it, so that later messages are about
@@ -291,6 +304,8 @@ void Executor::recover(const BlockWords& block) {
   if (distance != kNoCode) modal_.incremental = distance == 910;
   const GCode arc_distance = block.code(GGroup::arc_distance);
   if (arc_distance != kNoCode) modal_.arc_absolute = arc_distance == 901;
+  const GCode lathe = block.code(GGroup::lathe_diameter);
+  if (lathe != kNoCode) modal_.diameter = lathe == 70;
   const GCode mode = block.code(GGroup::motion);
   if (mode != kNoCode) {
     const bool read = g_code_info(mode, dialect_).status == GStatus::read;
@@ -318,8 +333,8 @@ void Executor::recover(const BlockWords& block) {
 /// Text behind the end that is no subroutine: one begins with an O word.
 void Executor::note_text_after_end(std::size_t index) {
   const Program& program = *unit_->program;
-  for (std::size_t i = index; i < program.blocks.size(); ++i) {
-    const Block& block = program.blocks[i];
+  for (std::size_t i = index; i < program.block_count; ++i) {
+    const Block& block = reach(i);
     for (std::uint32_t k = 0; k < block.piece_count; ++k) {
       const Piece& piece = program.pieces[block.first_piece + k];
       const PieceKind kind = piece.kind;

@@ -15,6 +15,7 @@
 #include "formats/nc/cycles.h"
 #include "formats/nc/interpreter.h"
 #include "formats/nc/modal_state.h"
+#include "formats/nc/program_stream.h"
 #include "formats/nc/program_unit.h"
 #include "formats/nc/spline_curve.h"
 #include "formats/nc/tool_radius.h"
@@ -30,23 +31,25 @@ struct LabelPlaces {
   std::size_t count = 0;
 };
 
-/// Runs the blocks of one program in the order of execution of RS274NGC.
+/// Runs the blocks of one program in the order of execution of RS274NGC. With `stream`, whose
+/// program it is, the window goes with the run.
 ///
 /// One object runs one program. What a block does in which order stands in executor.cpp, motion in
-/// execute_motion.cpp, cycles in execute_cycles.cpp, threads in execute_threads.cpp, splines in
-/// execute_splines.cpp, offsets in execute_offsets.cpp, tools in execute_tools.cpp, cutter radius
-/// in execute_radius.cpp, process words and comments in execute_process.cpp, loops and branches in
-/// execute_flow.cpp, calls in execute_calls.cpp, saved modal state in execute_saved_state.cpp, what
-/// only other controls have in execute_dialects.cpp and the
-/// files execute_siemens*.cpp.
+/// execute_motion.cpp, cycles in execute_cycles.cpp, threads in execute_threads.cpp, probing in
+/// execute_probe.cpp, splines in execute_splines.cpp, offsets in execute_offsets.cpp, tools in
+/// execute_tools.cpp, cutter radius in execute_radius.cpp, process words and comments in
+/// execute_process.cpp, loops and branches in execute_flow.cpp, calls in execute_calls.cpp, saved
+/// modal state in execute_saved_state.cpp, what only other controls have in execute_dialects.cpp
+/// and the files execute_siemens*.cpp.
 class Executor {
  public:
   Executor(const Program& program, const InterpreterSettings& settings, const EventMatcher& matcher,
-           CanonicalSink& sink);
+           CanonicalSink& sink, ProgramStream* stream = nullptr);
   Result<InterpretationSummary> run();
 
  private:
-  bool skipped(std::size_t index) const;
+  const Block& reach(std::size_t index);
+  bool skipped(const Block& block) const;
   bool run_block();
   bool spend(std::uint64_t amount, TextPlace place);
   void stop(const char* code, std::string text, TextPlace place);
@@ -133,6 +136,8 @@ class Executor {
   void synchronised_move(const BlockWords& block, const BlockPlan& plan, const AxisWords& end,
                          double pitch);
   std::string thread(const BlockWords& block, const BlockPlan& plan);
+  std::string why_not_probing(const BlockPlan& plan, const AxisWords& end) const;
+  void probe(const BlockWords& block, const BlockPlan& plan);
   void spline(const BlockWords& block, const BlockPlan& plan, GCode before);
   bool may_stand_in_spline(const BlockWords& block);
   void add_control_point(const BlockWords& block, const BlockPlan& plan);
@@ -235,6 +240,7 @@ class Executor {
 
   std::vector<std::unique_ptr<ProgramUnit>> units_;      ///< the first is the program
   std::unordered_map<std::string, ProgramUnit*> files_;  ///< by subroutine; nullptr: none
+  ProgramStream* stream_;                                ///< of the program; nullptr: it is whole
   ProgramUnit* unit_ = nullptr;                          ///< whose blocks are run
   std::uint32_t input_line_ = 0;                         ///< as BlockReader::select takes it
   std::vector<CallFrame> frames_;                        ///< the first is the program

@@ -72,6 +72,7 @@ struct FlowIndex {
 /// crossed partner, a subroutine within a subroutine or a loop, a label that its subroutine (or the
 /// main program) has already used, return outside a subroutine, break and continue outside a while
 /// or do of their label, more than 100 of them within each other. Cost: one pass over the pieces.
+/// @pre program.is_whole()
 FlowIndex index_flow(const Program& program);
 
 }  // namespace smoothpost::nc

@@ -2,6 +2,7 @@
 
 #include "formats/nc/event_words.h"
 #include "formats/nc/executor.h"
+#include "kernels/core/contract.h"
 
 namespace smoothpost::nc {
 
@@ -9,7 +10,16 @@ Result<InterpretationSummary> interpret(const Program& program, const Interprete
                                         CanonicalSink& sink) {
   const Result<EventMatcher> matcher = EventMatcher::compile(settings.process);
   if (!matcher.ok()) return Result<InterpretationSummary>::failure(matcher.diagnostics());
+  require(program.is_whole(), "a whole program; windows of one are run by its stream");
   return Executor(program, settings, matcher.value(), sink).run();
+}
+
+Result<InterpretationSummary> interpret(ProgramStream& stream, const InterpreterSettings& settings,
+                                        CanonicalSink& sink) {
+  const Result<EventMatcher> matcher = EventMatcher::compile(settings.process);
+  if (!matcher.ok()) return Result<InterpretationSummary>::failure(matcher.diagnostics());
+  stream.rewind();
+  return Executor(stream.program(), settings, matcher.value(), sink, &stream).run();
 }
 
 }  // namespace smoothpost::nc

@@ -13,6 +13,8 @@
 
 namespace smoothpost::nc {
 
+class ProgramStream;
+
 /// A work offset: what a controller adds to programmed words. mm and rad; `rotation` is about Z.
 struct WorkOffset {
   AxisWords words{};
@@ -79,6 +81,11 @@ struct InterpretationSummary {
 /// CanonicalMotion::axis_vector; the A B C bits of its unknown_start and unknown_end then say
 /// whether start_axis and end_axis are unknown.
 Result<InterpretationSummary> interpret(const Program& program, const InterpreterSettings& settings,
+                                        CanonicalSink& sink);
+
+/// The same calls and diagnostics for a program that is parsed while it runs: from its first window
+/// on, whatever window is there now.
+Result<InterpretationSummary> interpret(ProgramStream& stream, const InterpreterSettings& settings,
                                         CanonicalSink& sink);
 
 }  // namespace smoothpost::nc

@@ -51,6 +51,7 @@ struct ModalState {
   bool arc_absolute = false;
   bool inverse_time = false;
   bool per_turn = false;  ///< G95
+  bool diameter = false;  ///< G7: X words are diameters
   bool tcp = false;
   GCode radius_compensation = 400;        ///< G40, G41 or G42
   bool vector_words = false;              ///< fanuc G43.5: I J K are the tool axis

@@ -50,6 +50,9 @@ class ParameterStore : public ParameterValues {
   virtual void assign(const EvaluatedAssignment& assignment) = 0;
   virtual void enter(const CallScope& scope) = 0;
   virtual void leave() = 0;
+  /// A probing motion (G38.2 ..) came to its programmed end, where the machine stands now, without
+  /// a touch.
+  virtual void set_probed() {}
   /// The value that a subroutine of RS274NGC gives back.
   virtual void set_result(std::optional<double> value) = 0;
 };

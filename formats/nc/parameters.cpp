@@ -209,11 +209,11 @@ std::optional<double> Parameters::computed(std::string_view name) const {
   if (name == "_retract_r_plane") return flag(!modal.retract_to_old);
   if (name == "_retract_old_z") return flag(modal.retract_to_old);
   if (name == "_ijk_absolute_mode") return flag(modal.arc_absolute);
-  if (name == "_lathe_radius_mode" || name == "_spindle_rpm_mode") return 1.0;
+  if (name == "_lathe_diameter_mode") return flag(modal.diameter);
+  if (name == "_lathe_radius_mode") return flag(!modal.diameter);
+  if (name == "_spindle_rpm_mode") return 1.0;
   if (name == "_ccomp") return modal.radius_compensation;
-  if (name == "_lathe_diameter_mode" || name == "_spindle_css_mode") {
-    return 0.0;
-  }
+  if (name == "_spindle_css_mode") return 0.0;
   if (name == "_vmajor") return 2.9;
   if (name == "_coord_system") {
     const int system = state_.coordinates.system();
@@ -257,6 +257,21 @@ void Parameters::assign(const EvaluatedAssignment& assignment) {
   } else {
     names_.back()[assignment.name] = value;
   }
+}
+
+/// Positions as program words, in the units of the probing block.
+void Parameters::set_probed() {
+  const Coordinates& coordinates = state_.coordinates;
+  const AxisWords words = coordinates.program_from_world(coordinates.world());
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const int index = kProbe + static_cast<int>(i);
+    if (((coordinates.unknown() >> i) & 1) != 0) {
+      numbers_.erase(index);
+    } else {
+      numbers_[index] = length_in(state_.modal.unit, i, words[i]);
+    }
+  }
+  numbers_[kLastProbe] = 0.0;
 }
 
 void Parameters::enter(const CallScope& scope) {

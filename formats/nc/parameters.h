@@ -15,8 +15,9 @@ namespace smoothpost::nc {
 ///
 /// Lengths of #5161 to #5390 and of #5401 to #5410 are in the machine's unit
 /// (InterpreterSettings::inch_default), #5420 to #5428 and named positions in the program's; angles
-/// in degrees. A subroutine has its own #1 to #30 (0 without an argument) and its own names; names
-/// that begin with _ are those of the whole program.
+/// in degrees. #5061 to #5070 are known behind a probing motion only. A subroutine has its own #1
+/// to #30 (0 without an argument) and its own names; names that begin with _ are those of the whole
+/// program.
 class Parameters final : public ParameterStore {
  public:
   Parameters(const InterpreterSettings& settings, ControllerState state)
@@ -28,6 +29,7 @@ class Parameters final : public ParameterStore {
   void assign(const EvaluatedAssignment& assignment) override;
   void enter(const CallScope& scope) override;
   void leave() override;
+  void set_probed() override;
   void set_result(std::optional<double> value) override { result_ = value; }
 
  private:

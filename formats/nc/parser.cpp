@@ -83,8 +83,11 @@ class Rs274Builder final : public TreeBuilder {
     }
     if (letter == 'O' || letter == 'N') return program_or_line_number(begin, scanned);
     push_word(letter, begin, scanned);
-    if (letter == 'M' && (scanned.value == 2.0 || scanned.value == 30.0) && !deleted_) {
-      ended_ = true;
+    if (letter == 'M') {
+      if ((scanned.value == 2.0 || scanned.value == 30.0) && !deleted_) ended_ = true;
+      if (scanned.value > 96.5 && scanned.value < 99.5) program_.has_calls = true;
+    } else if (letter == 'G' && scanned.value > 64.5 && scanned.value < 65.5) {
+      program_.has_calls = true;
     }
     return next;
   }
@@ -151,6 +154,7 @@ class Rs274Builder final : public TreeBuilder {
     if (!found.ok()) return refuse_expression(begin, value, found);
     ScannedNumber span;
     span.next = value + found.length;
+    program_.has_calls = program_.has_calls || letter == 'G' || letter == 'M';
     push_word(letter, begin, span, WordForm::expression);
     return span.next;
   }
@@ -195,10 +199,10 @@ class Rs274Builder final : public TreeBuilder {
     if (!only_blanks_ || rest != line_end_) return construct(begin);
     const bool opens = !percent_seen_ && !words_seen_;
     if (!opens && !percent_seen_ && !ended_ && is_linuxcnc()) {
-      log_.warning("NC112",
-                   "this % closes a program that no % opened: it is read as the end of the "
-                   "program, but LinuxCNC refuses it; write a % on the first line too",
-                   place(begin));
+      warning("NC112",
+              "this % closes a program that no % opened: it is read as the end of the "
+              "program, but LinuxCNC refuses it; write a % on the first line too",
+              begin);
     }
     percent_seen_ = true;
     percent_closes_ = !opens;
@@ -221,25 +225,34 @@ ParsedProgram parse(std::string text, std::string file_name) {
 }
 
 ParsedProgram parse(std::string text, std::string file_name, InputDialect dialect) {
+  DiagnosticLog log(file_name);
   ParsedProgram parsed;
-  parsed.program.dialect = dialect;
-  parsed.program.file_name = std::move(file_name);
-  parsed.program.text = std::move(text);
-  DiagnosticLog log(parsed.program.file_name);
-  if (parsed.program.text.size() >= std::numeric_limits<std::uint32_t>::max()) {
-    log.error("NC111",
-              "the file has " + std::to_string(parsed.program.text.size()) +
-                  " bytes; at most 4294967294 are read: split the program",
-              {});
-    parsed.program.text.clear();
-  }
-  if (dialect == InputDialect::siemens) {
-    SiemensBuilder(parsed.program, log).build();
-  } else {
-    Rs274Builder(parsed.program, log).build();
-  }
+  parsed.program = program_of(std::move(text), std::move(file_name), dialect, log);
+  make_builder(parsed.program, log)->read_all();
   parsed.diagnostics = log.take();
   return parsed;
+}
+
+Program program_of(std::string text, std::string file_name, InputDialect dialect,
+                   DiagnosticLog& log) {
+  Program program;
+  program.dialect = dialect;
+  program.file_name = std::move(file_name);
+  program.text = std::move(text);
+  if (program.text.size() >= std::numeric_limits<std::uint32_t>::max()) {
+    log.error("NC111",
+              "the file has " + std::to_string(program.text.size()) +
+                  " bytes; at most 4294967294 are read: split the program",
+              {});
+    program.text.clear();
+  }
+  return program;
+}
+
+std::unique_ptr<TreeBuilder> make_builder(Program& program, DiagnosticLog& log) {
+  if (program.dialect == InputDialect::siemens)
+    return std::make_unique<SiemensBuilder>(program, log);
+  return std::make_unique<Rs274Builder>(program, log);
 }
 
 }  // namespace smoothpost::nc

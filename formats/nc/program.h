@@ -82,23 +82,36 @@ struct LateFault {
   std::string text;
 };
 
-/// NC text as a tree: one block a line, pieces with spans. Line = block index + 1; a piece's column
-/// is its offset from the block's first piece + 1.
+/// NC text as a tree: one block a line, pieces with spans. Line = number of the block + 1; a
+/// piece's column is its offset from the block's first piece + 1.
+///
+/// `blocks` and `pieces` are those of the whole text, or of a window of it (program_stream.h); the
+/// other members are always of the whole text.
 struct Program {
   InputDialect dialect = InputDialect::linuxcnc;
   std::string file_name;
   std::string text;
   std::vector<Block> blocks;
   std::vector<Piece, LargePageAllocator<Piece>> pieces;
+  std::size_t first_block = 0;           ///< number of the first one in `blocks`
+  std::size_t block_count = 0;           ///< of the text: its lines
   bool has_flow = false;                 ///< some piece is of kind flow
+  bool has_calls = false;                ///< M97 to M99, G65, or a G or M word that is computed
   std::uint32_t first_fault = 0;         ///< line of the first fault before the end; 0: none
   std::uint32_t end_block = 0xffffffff;  ///< first block behind M2 or M30
   std::vector<LateFault> late_faults;    ///< at most kLateFaults, in order of the text
   static constexpr std::size_t kLateFaults = 100;
+
+  /// @pre the block stands in `blocks`
+  const Block& block(std::size_t number) const { return blocks[number - first_block]; }
+  bool holds(std::size_t number) const { return number - first_block < blocks.size(); }
+  bool is_whole() const { return blocks.size() == block_count; }
+  /// Its run may go to any block of the text.
+  bool jumps() const { return has_flow || has_calls; }
 };
 
 /// The text of the program, put together from its pieces: equal to the text that was parsed, byte
-/// for byte, whether or not it has errors.
+/// for byte, whether or not it has errors. Of a window: the text of its blocks.
 std::string print(const Program& program);
 
 }  // namespace smoothpost::nc

@@ -28,7 +28,7 @@ struct SavedState {
   double unit = 1.0, feed_unit = 1.0;
   GCode plane = 170;
   bool incremental = false, arc_absolute = false, inverse_time = false, per_turn = false,
-       retract_to_old = false;
+       retract_to_old = false, diameter = false;
   double linear_feed = 0.0, angular_feed = 0.0, speed = 0.0;
   int system = 1;
   double tool_length = 0.0;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstring>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -11,24 +12,43 @@
 
 namespace smoothpost::nc {
 
-/// Builds the tree in one pass: what all dialects share. Lines are separated first, so that nothing
-/// reaches over a line end; `content` of a dialect then pushes pieces that tile the line.
+/// Builds the tree line by line: what all dialects share. Lines are separated first, so that
+/// nothing reaches over a line end; `content` of a dialect then pushes pieces that tile the line.
+/// What is known of a line does not depend on the pieces of lines before it.
 class TreeBuilder {
  public:
   TreeBuilder(Program& program, DiagnosticLog& log)
       : program_(program),
         log_(log),
         base_(program.text.data()),
-        text_end_(base_ + program.text.size()) {}
+        text_end_(base_ + program.text.size()),
+        next_(base_) {
+    if (program.text.starts_with("\xEF\xBB\xBF")) bom_ = 3;  // byte order mark of some editors
+  }
   virtual ~TreeBuilder() = default;
 
-  void build() {
-    program_.blocks.reserve(program_.text.size() / 24 + 1);
-    program_.pieces.reserve(program_.text.size() / 3 + 4);
-    const char* p = base_;
-    if (program_.text.starts_with("\xEF\xBB\xBF")) bom_ = 3;  // byte order mark of some editors
-    while (p != text_end_) p = line(p);
+  /// Appends all further lines.
+  void read_all() {
+    const auto left = static_cast<std::size_t>(text_end_ - next_);
+    program_.blocks.reserve(program_.blocks.size() + left / 24 + 1);
+    program_.pieces.reserve(program_.pieces.size() + left / 3 + 4);
+    while (next_ != text_end_) next_ = line(next_);
   }
+
+  /// Appends one further line, or up to `most`, but no more when they have kBytes of text a line.
+  void read_some(std::size_t most) {
+    constexpr std::size_t kBytes = 64;
+    const char* const begin = next_;
+    for (std::size_t i = 0; i < most && next_ != text_end_; ++i) {
+      next_ = line(next_);
+      if (static_cast<std::size_t>(next_ - begin) / kBytes >= most) return;
+    }
+  }
+
+  bool at_end() const { return next_ == text_end_; }
+
+  /// The text was read before to its end: its faults are told, and Program has them.
+  void read_again() { again_ = true; }
 
  protected:
   /// Pushes the pieces of one line from `begin` to line_end_.
@@ -63,7 +83,12 @@ class TreeBuilder {
     return end;
   }
 
+  void warning(const char* code, std::string why, const char* where) {
+    if (!again_) log_.warning(code, std::move(why), place(where));
+  }
+
   void error(const char* code, std::string why, const char* where) {
+    if (again_) return;
     if (!quiet_) {
       if (program_.first_fault == 0) program_.first_fault = line_number_;
       return log_.error(code, std::move(why), place(where));
@@ -132,9 +157,7 @@ class TreeBuilder {
     words_in_line_ = false;
     only_blanks_ = true;
     deleted_ = false;
-    if (ended_ && !quiet_) {
-      program_.end_block = static_cast<std::uint32_t>(program_.blocks.size());
-    }
+    if (ended_ && !quiet_) program_.end_block = line_number_ - 1;
     quiet_ = ended_;
     if (in_trailer_) {
       if (begin != line_end_) push(PieceKind::trailer, begin, line_end_);
@@ -152,6 +175,7 @@ class TreeBuilder {
       push(PieceKind::line_end, line_end_, next);
     }
     program_.blocks.push_back({first, static_cast<std::uint32_t>(program_.pieces.size()) - first});
+    if (!again_) program_.block_count = line_number_;
     if (percent_closes_) in_trailer_ = true;
     return next;
   }
@@ -168,9 +192,18 @@ class TreeBuilder {
     return found ? found : next_line_feed_;
   }
 
+  const char* next_;  ///< begin of the next line
   int bom_ = 0;
   const char* next_line_feed_ = nullptr;
   bool in_trailer_ = false;
+  bool again_ = false;
 };
+
+/// The builder of the program's dialect. `program`, with its text, and `log` outlive it.
+std::unique_ptr<TreeBuilder> make_builder(Program& program, DiagnosticLog& log);
+
+/// An empty program of that text; a text that is too long is refused and left out.
+Program program_of(std::string text, std::string file_name, InputDialect dialect,
+                   DiagnosticLog& log);
 
 }  // namespace smoothpost::nc

@@ -23,6 +23,7 @@ class Rs274Values final : public WordValues {
   Evaluated assign(std::string_view text) override;
   void finish_block(bool good) override;
   bool inch() const override { return modal_.unit != 1.0; }
+  bool diameter() const override { return modal_.diameter; }
   bool in_cycle() const override { return is_cycle(modal_.motion); }
   Evaluated value(std::string_view text) override {
     return evaluate_value(text, store_.get(), rules_);

@@ -41,6 +41,7 @@ struct CanonicalMotion {
   bool is_arc = false;
   bool tcp = false;               ///< tool-centre-point mode: XYZ is the tip in the workpiece
   bool axis_vector = false;       ///< tcp with the tool axis given as a vector
+  bool probe = false;             ///< to its end only if the probe says nothing on the way (G38.2)
   bool machine_position = false;  ///< G53, G28, G30: a place of the input machine, not of the part
   AxisMask unknown_start = 0;     ///< words that the program has not yet given a value
   AxisMask unknown_end = 0;

@@ -60,6 +60,9 @@ class Canon:
     def straight_feed(self, *to):
         show("STRAIGHT_FEED", six(to))
 
+    def straight_probe(self, *to):
+        show("STRAIGHT_PROBE", six(to))
+
     def straight_traverse(self, *to):
         show("STRAIGHT_TRAVERSE", six(to))
 

@@ -129,7 +129,7 @@ TEST_CASE("motion: refusals of straight moves", "[formats][nc][motion]") {
 
 TEST_CASE("motion: codes of later versions and other controllers are named",
           "[formats][nc][motion]") {
-  for (const char* code : {"G7", "G38.2", "G43.2", "G88", "G96"}) {
+  for (const char* code : {"G43.2", "G88", "G96"}) {
     const Run r = run_lines(std::string("G0 X0\n") + code + " X1");
     INFO(code);
     REQUIRE(r.errors() == one("NC202"));

@@ -21,6 +21,9 @@ struct OracleMotion {
   Vec3 centre = Vec3::Zero();   ///< of an arc; the coordinate along the normal is the end's
   double feed_mm_per_min = 0.0;
   double tool_z = 0.0;  ///< active tool length, mm
+  /// What the end may be off, mm: behind a probing motion rs274 takes the machine to stand 0.254 mm
+  /// before that motion's end.
+  double slack = 0.0;
 };
 
 struct OracleRun {
