@@ -73,6 +73,9 @@ Result<InterpretationSummary> Executor::run() {
   if (program.has_flow && is_siemens()) begin_siemens_program();
   while (run_block()) {
   }
+  // The faults of the text behind the run count too.
+  while (stream_ != nullptr && stream_->next()) {
+  }
   radius_.end();
   if (program.first_fault != 0 && !log_.has_error()) {
     log_.error("NC200", "this line has text that could not be read; mend what the reader named",
@@ -97,24 +100,27 @@ Result<InterpretationSummary> Executor::run() {
   return {std::move(summary_), log_.take()};
 }
 
-/// A block of the text that is run. Blocks before the window are gone: of a program that comes back
-/// to them the window is the whole text.
-const Block& Executor::reach(std::size_t index) {
+/// A block of the text that is run; nullptr: the run is void, as the program turned out to jump.
+/// Blocks before the window are gone: of a program that comes back to them the window is the whole
+/// text.
+const Block* Executor::reach(std::size_t index) {
   const Program& program = *unit_->program;
   while (!program.holds(index)) {
-    require(stream_ != nullptr && index >= program.first_block && stream_->next(),
+    require(stream_ != nullptr && index >= program.first_block,
             "the run goes forward through the windows of its program");
+    if (!stream_->next()) return nullptr;
   }
-  return program.block(index);
+  return &program.block(index);
 }
 
 /// Runs the next block; false: there is none.
 bool Executor::run_block() {
   if (place_.next >= range_end_ || place_.next < range_begin_) return leave_range();
   const std::size_t index = place_.next++;
-  const Block& next = reach(index);
-  if (skipped(next)) return true;
-  const std::uint64_t cost = cost_of(*unit_->program, next);
+  const Block* next = reach(index);
+  if (next == nullptr) return false;
+  if (skipped(*next)) return true;
+  const std::uint64_t cost = cost_of(*unit_->program, *next);
   if (cost > budget_) {
     spend(cost, {static_cast<std::uint32_t>(index) + 1, 1});
     return false;
@@ -334,9 +340,10 @@ void Executor::recover(const BlockWords& block) {
 void Executor::note_text_after_end(std::size_t index) {
   const Program& program = *unit_->program;
   for (std::size_t i = index; i < program.block_count; ++i) {
-    const Block& block = reach(i);
-    for (std::uint32_t k = 0; k < block.piece_count; ++k) {
-      const Piece& piece = program.pieces[block.first_piece + k];
+    const Block* block = reach(i);
+    if (block == nullptr) return;
+    for (std::uint32_t k = 0; k < block->piece_count; ++k) {
+      const Piece& piece = program.pieces[block->first_piece + k];
       const PieceKind kind = piece.kind;
       const bool label = kind == PieceKind::word && piece.letter == 'O' && called_;
       const bool section = is_siemens() && kind == PieceKind::statement && called_ &&

@@ -48,7 +48,7 @@ class Executor {
   Result<InterpretationSummary> run();
 
  private:
-  const Block& reach(std::size_t index);
+  const Block* reach(std::size_t index);
   bool skipped(const Block& block) const;
   bool run_block();
   bool spend(std::uint64_t amount, TextPlace place);

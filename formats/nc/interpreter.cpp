@@ -17,9 +17,16 @@ Result<InterpretationSummary> interpret(const Program& program, const Interprete
 Result<InterpretationSummary> interpret(ProgramStream& stream, const InterpreterSettings& settings,
                                         CanonicalSink& sink) {
   const Result<EventMatcher> matcher = EventMatcher::compile(settings.process);
-  if (!matcher.ok()) return Result<InterpretationSummary>::failure(matcher.diagnostics());
-  stream.rewind();
-  return Executor(stream.program(), settings, matcher.value(), sink, &stream).run();
+  if (!matcher.ok()) {
+    while (stream.next()) {
+    }
+    return Result<InterpretationSummary>::failure(matcher.diagnostics());
+  }
+  require(stream.program().first_block == 0, "a stream that has not been run");
+  for (;;) {
+    auto result = Executor(stream.program(), settings, matcher.value(), sink, &stream).run();
+    if (!stream.begins_again()) return result;
+  }
 }
 
 }  // namespace smoothpost::nc

@@ -83,8 +83,8 @@ struct InterpretationSummary {
 Result<InterpretationSummary> interpret(const Program& program, const InterpreterSettings& settings,
                                         CanonicalSink& sink);
 
-/// The same calls and diagnostics for a program that is parsed while it runs: from its first window
-/// on, whatever window is there now.
+/// The same calls and diagnostics for a program that is parsed while it runs, to its end whatever
+/// the run does. @pre the stream stands at its first window (program_stream.h: begins_again)
 Result<InterpretationSummary> interpret(ProgramStream& stream, const InterpreterSettings& settings,
                                         CanonicalSink& sink);
 

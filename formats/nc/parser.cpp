@@ -199,10 +199,10 @@ class Rs274Builder final : public TreeBuilder {
     if (!only_blanks_ || rest != line_end_) return construct(begin);
     const bool opens = !percent_seen_ && !words_seen_;
     if (!opens && !percent_seen_ && !ended_ && is_linuxcnc()) {
-      warning("NC112",
-              "this % closes a program that no % opened: it is read as the end of the "
-              "program, but LinuxCNC refuses it; write a % on the first line too",
-              begin);
+      log_.warning("NC112",
+                   "this % closes a program that no % opened: it is read as the end of the "
+                   "program, but LinuxCNC refuses it; write a % on the first line too",
+                   place(begin));
     }
     percent_seen_ = true;
     percent_closes_ = !opens;

@@ -47,9 +47,6 @@ class TreeBuilder {
 
   bool at_end() const { return next_ == text_end_; }
 
-  /// The text was read before to its end: its faults are told, and Program has them.
-  void read_again() { again_ = true; }
-
  protected:
   /// Pushes the pieces of one line from `begin` to line_end_.
   virtual void content(const char* begin) = 0;
@@ -83,12 +80,7 @@ class TreeBuilder {
     return end;
   }
 
-  void warning(const char* code, std::string why, const char* where) {
-    if (!again_) log_.warning(code, std::move(why), place(where));
-  }
-
   void error(const char* code, std::string why, const char* where) {
-    if (again_) return;
     if (!quiet_) {
       if (program_.first_fault == 0) program_.first_fault = line_number_;
       return log_.error(code, std::move(why), place(where));
@@ -175,7 +167,7 @@ class TreeBuilder {
       push(PieceKind::line_end, line_end_, next);
     }
     program_.blocks.push_back({first, static_cast<std::uint32_t>(program_.pieces.size()) - first});
-    if (!again_) program_.block_count = line_number_;
+    program_.block_count = line_number_;
     if (percent_closes_) in_trailer_ = true;
     return next;
   }
@@ -196,7 +188,6 @@ class TreeBuilder {
   int bom_ = 0;
   const char* next_line_feed_ = nullptr;
   bool in_trailer_ = false;
-  bool again_ = false;
 };
 
 /// The builder of the program's dialect. `program`, with its text, and `log` outlive it.

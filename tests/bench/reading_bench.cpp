@@ -9,8 +9,10 @@
 
 #include "formats/nc/interpreter.h"
 #include "formats/nc/parser.h"
+#include "formats/nc/program_stream.h"
 
-// Reading NC text: parse() alone, parse() with interpret(), and two floors of the same run:
+// Reading NC text: parse() alone, parse() with interpret(), the same in windows (what a conversion
+// does), and two floors of the same run:
 // counting lines by memchr, and a bare scan of "letter number" that checks no grammar. Counters:
 // MB/s of text, and `of_digits`, the share of the digit scan's speed measured just before.
 namespace {
@@ -178,11 +180,22 @@ void parse_and_interpret(benchmark::State& state) {
   });
 }
 
+void read_in_windows(benchmark::State& state) {
+  timed(state, [&](std::string& text) {
+    nc::ProgramStream stream(std::move(text), "p.ngc", nc::InputDialect::linuxcnc, {});
+    NullSink sink;
+    const auto result = nc::interpret(stream, {}, sink);
+    if (!result.ok()) state.SkipWithError("the program was refused");
+    benchmark::DoNotOptimize(sink.sum);
+  });
+}
+
 // Argument 0: five-axis, 1: three-axis modal.
 BENCHMARK(floor_lines)->Arg(0)->Arg(1)->UseManualTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(floor_digits)->Arg(0)->Arg(1)->UseManualTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(parse_only)->Arg(0)->Arg(1)->UseManualTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(parse_and_interpret)->Arg(0)->Arg(1)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(read_in_windows)->Arg(0)->Arg(1)->UseManualTime()->Unit(benchmark::kMillisecond);
 
 }  // namespace
 

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "formats/nc/program_stream.h"
+#include "kernels/core/contract.h"
 #include "tests/formats/nc/recording.h"
 #include "tests/support/support.h"
 
@@ -112,10 +113,10 @@ Reading read_whole(const std::string& text, const nc::InterpreterSettings& setti
 }
 
 struct Seen {
-  std::size_t texts = 0, calls = 0, ok = 0, windowed = 0, faulty = 0;
+  std::size_t texts = 0, calls = 0, ok = 0, windowed = 0, faulty = 0, restarted = 0;
 };
 
-/// The same reading in windows of every size, and by a second run of the same stream.
+/// The same reading in windows of every size.
 void require_same(const std::string& text, const nc::InterpreterSettings& settings,
                   nc::InputDialect dialect, Seen& seen) {
   const Reading whole = read_whole(text, settings, dialect);
@@ -123,37 +124,43 @@ void require_same(const std::string& text, const nc::InterpreterSettings& settin
   seen.calls += whole.calls;
   for (const std::size_t window : kWindows) {
     std::string printed;
-    const auto look = [&](const nc::Program& p) {
+    Trace trace;
+    std::size_t restarts = 0;
+    nc::ProgramStream::Hooks hooks;
+    hooks.look = [&](const nc::Program& p) {
       if (p.first_block == 0) printed.clear();
       printed += nc::print(p);
     };
-    nc::ProgramStream stream(text, "t.nc", dialect, window, look);
-    for (int again = 0; again < 2; ++again) {
-      Trace trace;
-      const auto result = nc::interpret(stream, settings, trace);
-      const Reading found = reading(stream.program(), stream.diagnostics(), result, trace);
-      if (!(found == whole)) {
-        INFO(text.substr(0, 3000));
-        INFO("window " << window << ", run " << again);
-        CHECK(found.text == whole.text);
-        REQUIRE(found.calls == whole.calls);
-        REQUIRE(found.hash == whole.hash);
-        REQUIRE(found == whole);
-      }
-      if (window == 1 && again == 0) {
-        seen.ok += result.ok() ? 1 : 0;
-        seen.windowed += stream.program().is_whole() ? 0 : 1;
-        seen.faulty += has_error(stream.diagnostics()) ? 1 : 0;
-      }
+    hooks.restart = [&] {
+      trace = {};
+      ++restarts;
+    };
+    nc::ProgramStream stream(text, "t.nc", dialect, hooks, window);
+    const auto result = nc::interpret(stream, settings, trace);
+    const Reading found = reading(stream.program(), stream.diagnostics(), result, trace);
+    if (!(found == whole)) {
+      INFO(text.substr(0, 3000));
+      INFO("window " << window);
+      CHECK(found.text == whole.text);
+      REQUIRE(found.calls == whole.calls);
+      REQUIRE(found.hash == whole.hash);
+      REQUIRE(found == whole);
     }
     if (printed != text) REQUIRE(printed == text);
+    if (restarts > 1) REQUIRE(restarts <= 1);
+    if (window == 1) {
+      seen.ok += result.ok() ? 1 : 0;
+      seen.windowed += stream.program().is_whole() ? 0 : 1;
+      seen.faulty += has_error(stream.diagnostics()) ? 1 : 0;
+      seen.restarted += restarts;
+    }
   }
 }
 
 void report(const char* what, const Seen& seen) {
   WARN(what << ": " << seen.texts << " texts, " << seen.calls << " calls the same; " << seen.ok
-            << " read without fault, " << seen.windowed << " in windows, " << seen.faulty
-            << " with faulty text");
+            << " read without fault, " << seen.windowed << " in windows, " << seen.restarted
+            << " begun again as a whole, " << seen.faulty << " with faulty text");
 }
 
 nc::InterpreterSettings lenient() {
@@ -406,7 +413,7 @@ TEST_CASE("stream: a window is the part of the program that its numbers say",
   const std::string text = five_axis(50);
   const nc::Program whole = nc::parse(text, "t.nc").program;
   CHECK(whole.is_whole());
-  nc::ProgramStream stream(text, "t.nc", nc::InputDialect::linuxcnc, 8);
+  nc::ProgramStream stream(text, "t.nc", nc::InputDialect::linuxcnc, {}, 8);
   const nc::Program& window = stream.program();
   CHECK(window.first_block == 0);
   CHECK(window.block_count == whole.block_count);
@@ -429,9 +436,12 @@ TEST_CASE("stream: a window is the part of the program that its numbers say",
   } while (stream.next());
   CHECK(blocks == whole.block_count);
   CHECK_FALSE(stream.next());
-  stream.rewind();
-  CHECK(window.first_block == 0);
-  CHECK(window.holds(0));
+  CHECK_FALSE(stream.begins_again());
+  // A second run of it, and its diagnostics before its end, are faults of the caller.
+  Trace trace;
+  CHECK_THROWS_AS(nc::interpret(stream, {}, trace), ContractViolation);
+  const nc::ProgramStream begun(text, "t.nc", nc::InputDialect::linuxcnc, {}, 8);
+  CHECK_THROWS_AS(begun.diagnostics(), ContractViolation);
 }
 
 TEST_CASE("stream: reading 100,000 five-axis lines takes less than twice the text",
@@ -451,8 +461,9 @@ TEST_CASE("stream: reading 100,000 five-axis lines takes less than twice the tex
   {
     const std::size_t before = allocated();
     Peak peak;
-    nc::ProgramStream stream(text, "t.nc", nc::InputDialect::linuxcnc, nc::ProgramStream::kWindow,
-                             [&](const nc::Program&) { peak.sample(); });
+    nc::ProgramStream::Hooks hooks;
+    hooks.look = [&](const nc::Program&) { peak.sample(); };
+    nc::ProgramStream stream(text, "t.nc", nc::InputDialect::linuxcnc, hooks);
     REQUIRE(nc::interpret(stream, settings, peak).ok());
     REQUIRE(peak.motions == 100'001);
     windowed = share(peak.most, before);
