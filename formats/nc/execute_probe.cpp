@@ -10,7 +10,9 @@ std::string Executor::why_not_probing(const BlockPlan& plan, const AxisWords& en
   if (modal_.inverse_time) return "no probing in inverse time mode (G93); write G94";
   if (modal_.per_turn) return "no probing while F counts by the turn (G95); write G94";
   if (radius_.is_on()) return "no probing under cutter radius compensation; write G40";
-  if ((coordinates_.unknown() & plan.axes) == 0 && end == coordinates_.world())
+  // The other two are content with no contact.
+  const bool must_touch = plan.motion == 382 || plan.motion == 384;
+  if (must_touch && (coordinates_.unknown() & plan.axes) == 0 && end == coordinates_.world())
     return "its end is where the machine stands; write a way to probe";
   return {};
 }

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "formats/nc/interpreter.h"
-#include "formats/nc/parser.h"
+#include "formats/nc/program_stream.h"
 #include "kernels/core/units.h"
 #include "machines/dialects/decimal.h"
 #include "machines/dialects/event_text.h"
@@ -311,8 +313,7 @@ bool take_guard(std::string& text) {
 
 // A machine program states its numbers: what a parameter or an expression comes to depends on what
 // the controller has stored.
-Diagnostics computed_words(const nc::Program& program) {
-  Diagnostics diagnostics;
+void note_computed_words(const nc::Program& program, Diagnostics& diagnostics) {
   for (std::size_t i = 0; i < program.blocks.size() && diagnostics.size() < 10; ++i) {
     const nc::Block& block = program.blocks[i];
     for (std::uint32_t k = 0; k < block.piece_count; ++k) {
@@ -323,7 +324,7 @@ Diagnostics computed_words(const nc::Program& program) {
       if (!computed) continue;
       Diagnostic d;
       d.code = "NC302";
-      d.where = {program.file_name, static_cast<int>(i + 1),
+      d.where = {program.file_name, static_cast<int>(program.first_block + i + 1),
                  static_cast<int>(piece.begin - program.pieces[block.first_piece].begin + 1)};
       d.text =
           "a parameter or an expression in a program of joint words is not certified: its value "
@@ -332,21 +333,24 @@ Diagnostics computed_words(const nc::Program& program) {
       break;
     }
   }
-  return diagnostics;
 }
 
 // Exact path holds when the first path mode word stands before the first motion, is G61, and no
 // other path mode follows.
-bool is_exact_path(const nc::Program& program) {
-  bool exact = false;
-  for (const auto& piece : program.pieces) {
-    if (piece.kind != nc::PieceKind::word || piece.letter != 'G') continue;
-    if (piece.value == 61.0) exact = true;
-    if (piece.value == 64.0 || piece.value == 61.1) return false;
-    if ((piece.value == 0.0 || piece.value == 1.0) && !exact) return false;
+struct ExactPath {
+  bool began = false;
+  bool broken = false;
+
+  bool holds() const { return began && !broken; }
+  void look_at(const nc::Program& program) {
+    for (const auto& piece : program.pieces) {
+      if (piece.kind != nc::PieceKind::word || piece.letter != 'G') continue;
+      if (piece.value == 61.0) began = true;
+      if (piece.value == 64.0 || piece.value == 61.1) broken = true;
+      if ((piece.value == 0.0 || piece.value == 1.0) && !began) broken = true;
+    }
   }
-  return exact;
-}
+};
 
 }  // namespace
 
@@ -357,11 +361,20 @@ Result<EmittedProgram> emit(const MachineDefinition& machine, const MachineProgr
 Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
                            const std::string& file_name) {
   const bool guard = take_guard(text);
-  auto parsed = nc::parse(std::move(text), file_name);
-  if (has_error(parsed.diagnostics))
-    return Result<ReadBack>::failure(std::move(parsed.diagnostics));
-  if (auto computed = computed_words(parsed.program); !computed.empty())
-    return Result<ReadBack>::failure(std::move(computed));
+  Diagnostics computed;
+  ExactPath exact_path;
+  std::optional<ReadBackSink> sink(std::in_place, machine);
+  nc::ProgramStream::Hooks hooks;
+  hooks.restart = [&] { sink.emplace(machine); };
+  hooks.look = [&](const nc::Program& window) {
+    if (window.first_block == 0) {
+      computed.clear();
+      exact_path = {};
+    }
+    note_computed_words(window, computed);
+    exact_path.look_at(window);
+  };
+  nc::ProgramStream program(std::move(text), file_name, nc::InputDialect::linuxcnc, hooks);
   nc::InterpreterSettings settings;
   settings.inch_default = machine.dialect.units == "inch";
   settings.has_tcp = false;
@@ -373,18 +386,19 @@ Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
     settings.axes |= static_cast<AxisMask>(1U << w);
     settings.home[w] = axis.joint.home;
   }
-  ReadBackSink sink(machine);
-  const auto summary = nc::interpret(parsed.program, settings, sink);
+  const auto summary = nc::interpret(program, settings, *sink);
+  if (has_error(program.diagnostics())) return Result<ReadBack>::failure(program.diagnostics());
+  if (!computed.empty()) return Result<ReadBack>::failure(std::move(computed));
   Diagnostics diagnostics = summary.diagnostics();
-  for (auto& d : sink.diagnostics) {
+  for (auto& d : sink->diagnostics) {
     d.where.file = file_name;
     diagnostics.push_back(d);
   }
   if (has_error(diagnostics)) return Result<ReadBack>::failure(std::move(diagnostics));
-  sink.result.offset_guard = guard;
-  sink.result.exact_path = is_exact_path(parsed.program);
-  sink.result.line_count = static_cast<std::uint32_t>(parsed.program.blocks.size());
-  return Result<ReadBack>(std::move(sink.result), std::move(diagnostics));
+  sink->result.offset_guard = guard;
+  sink->result.exact_path = exact_path.holds();
+  sink->result.line_count = static_cast<std::uint32_t>(program.program().block_count);
+  return Result<ReadBack>(std::move(sink->result), std::move(diagnostics));
 }
 
 const Dialect kDialect = {"linuxcnc",

@@ -2,13 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "formats/csv/cutter_locations.h"
 #include "formats/heidenhain/reader.h"
 #include "formats/nc/dialect_detection.h"
-#include "formats/nc/parser.h"
+#include "formats/nc/program_stream.h"
 #include "kernels/core/units.h"
 #include "postproc/pipeline/hash.h"
+#include "postproc/pipeline/motion_record.h"
 
 namespace smoothpost {
 
@@ -25,70 +27,10 @@ std::string words_text(AxisMask mask) {
   return text;
 }
 
-class Recorder : public CanonicalSink {
- public:
-  void motion(const CanonicalMotion& motion) override {
-    motions.push_back(motion);
-    order.push_back({Step::Kind::motion, motions.size() - 1});
-  }
-  void dwell(double seconds, std::uint32_t line) override {
-    PathEvent e;
-    e.kind = PathEvent::Kind::dwell;
-    e.seconds = seconds;
-    e.line = line;
-    add(std::move(e));
-  }
-  void event(const ProcessEvent& event) override {
-    PathEvent e;
-    e.event = event;
-    e.line = event.line;
-    add(std::move(e));
-  }
-  void comment(std::string_view text, std::uint32_t line) override {
-    PathEvent e;
-    e.kind = PathEvent::Kind::comment;
-    e.text = text;
-    e.line = line;
-    add(std::move(e));
-  }
-  void tool_length(double length, int tool, std::uint32_t line) override {
-    states.push_back({length, tool, Vec3::Zero(), 0.0, 0, line});
-    order.push_back({Step::Kind::tool, states.size() - 1});
-  }
-  void work_offset(const Vec3& origin, double rotation, int system, std::uint32_t line) override {
-    states.push_back({0.0, 0, origin, rotation, system, line});
-    order.push_back({Step::Kind::offset, states.size() - 1});
-  }
-  void program_end(std::uint32_t) override {}
-
-  struct State {
-    double length;
-    int tool;
-    Vec3 origin;
-    double rotation;
-    int system;
-    std::uint32_t line;
-  };
-  struct Step {
-    enum class Kind : std::uint8_t { motion, event, tool, offset } kind;
-    std::size_t index;
-  };
-  std::vector<CanonicalMotion> motions;
-  std::vector<PathEvent> events;
-  std::vector<State> states;
-  std::vector<Step> order;
-
- private:
-  void add(PathEvent e) {
-    events.push_back(std::move(e));
-    order.push_back({Step::Kind::event, events.size() - 1});
-  }
-};
-
 /// Turns recorded calls into path points and events.
 class PathBuilder {
  public:
-  PathBuilder(Recorder& recorder, const InputSettings& settings)
+  PathBuilder(MotionRecord& recorder, const InputSettings& settings)
       : recorder_(recorder), settings_(settings) {}
 
   Result<InterpretedInput> run() {
@@ -106,11 +48,17 @@ class PathBuilder {
     for (std::size_t i = 0; i < recorder_.motions.size(); ++i) {
       const auto& m = recorder_.motions[i];
       programmed_ |= m.programmed;
-      if (m.pitch != 0.0 && !has_error(diagnostics_))
+      if (m.synchronised && !has_error(diagnostics_))
         fail("NC316", m.line,
              "this motion follows the turning of the spindle (a thread, a rigid tap, a feed by the "
              "turn; first of such motions), which no output of this version does: let the CAM post "
              "write feeds by time, or keep this operation on its control",
+             m.column);
+      if (m.probe && !has_error(diagnostics_))
+        fail("NC317", m.line,
+             "this motion is a probe's (G38.2 to G38.5; first of such motions): it stops where the "
+             "probe touches, so that its end and what follows are not known before it runs: keep "
+             "probing in a program of its own on its control",
              m.column);
       if (m.kind == MotionKind::feed) last_feed_ = i + 1;
       if (m.tcp)
@@ -131,33 +79,41 @@ class PathBuilder {
 
   void build() {
     if (settings_.machine) out_.frames.input_machine = settings_.machine;
-    for (const auto& step : recorder_.order) {
+    for (const auto& step : recorder_.steps) {
+      add_motions(step.motions_before);
+      if (has_error(diagnostics_)) return;
       switch (step.kind) {
-        case Recorder::Step::Kind::tool:
+        case MotionRecord::Step::Kind::tool:
           set_tool(recorder_.states[step.index]);
           break;
-        case Recorder::Step::Kind::offset:
+        case MotionRecord::Step::Kind::offset:
           set_offset(recorder_.states[step.index]);
           break;
-        case Recorder::Step::Kind::event:
+        case MotionRecord::Step::Kind::event:
           add_event(recorder_.events[step.index]);
-          break;
-        case Recorder::Step::Kind::motion:
-          if (step.index < end_)
-            add_motion(recorder_.motions[step.index]);
-          else
-            skipped_end_.push_back(recorder_.motions[step.index].line);
           break;
       }
       if (has_error(diagnostics_)) return;
     }
+    add_motions(recorder_.motions.size());
+    if (has_error(diagnostics_)) return;
     if (out_.path.points.empty())
       fail("NC312", recorder_.motions.front().line,
            "no motion of the program starts from a known position: " + words_text(programmed_) +
                " are never all programmed");
   }
 
-  void set_tool(const Recorder::State& state) {
+  /// The next ones, before motion `end`.
+  void add_motions(std::size_t end) {
+    for (; next_ < end && !has_error(diagnostics_); ++next_) {
+      if (next_ < end_)
+        add_motion(next_);
+      else
+        skipped_end_.push_back(recorder_.motions[next_].line);
+    }
+  }
+
+  void set_tool(const MotionRecord::State& state) {
     compensation_ = state.length;
     if (state.tool > 0) tool_in_use(state.tool);
     // G43.1 states a length itself, with or without a tool number.
@@ -172,7 +128,7 @@ class PathBuilder {
     tool_length_ = known == settings_.tool_lengths.end() ? 0.0 : known->second;
   }
 
-  void set_offset(const Recorder::State& state) {
+  void set_offset(const MotionRecord::State& state) {
     if (!world_set_) {
       out_.frames.world_from_part = Pose::Identity();
       out_.frames.world_from_part.linear() = rotation_about(Vec3::UnitZ(), state.rotation);
@@ -212,7 +168,8 @@ class PathBuilder {
     out_.path.events.push_back(std::move(e));
   }
 
-  void add_motion(const CanonicalMotion& motion) {
+  void add_motion(std::size_t index) {
+    const MotionRecord::Motion& motion = recorder_.motions[index];
     // With the tool axis as a vector the rotary bits say whether that is unknown.
     const AxisMask counts =
         motion.axis_vector ? static_cast<AxisMask>(programmed_ | kRotary) : programmed_;
@@ -236,7 +193,8 @@ class PathBuilder {
       point.kind = MotionKind::rapid;
       point.is_arc = false;
       first_line_ = motion.line;
-      if (lacking_start == 0 && motion.unknown_start == 0) add_start_point(motion, point);
+      if (lacking_start == 0 && motion.unknown_start == 0)
+        add_start_point(recorder_.start_of(index), point, motion.axis_vector);
       if (lacking_start != 0) lost_lines_.push_back(motion.line);
     } else if (lost_) {
       point.replanned = true;
@@ -247,7 +205,7 @@ class PathBuilder {
     push(std::move(point));
   }
 
-  PathPoint make_point(const CanonicalMotion& motion) {
+  PathPoint make_point(const MotionRecord::Motion& motion) {
     PathPoint point;
     point.kind = motion.kind;
     point.interpolation =
@@ -264,10 +222,10 @@ class PathBuilder {
     point.tip_offset = compensates_ ? tool_length_ - compensation_ : 0.0;
     if (motion.axis_vector)
       set_location(point, motion.end, axis_of(motion.end_axis, motion.end, point));
-    if (motion.is_arc) {
+    if (motion.arc >= 0) {
       point.is_arc = true;
       point.arc = static_cast<std::int32_t>(out_.path.arcs.size());
-      out_.path.arcs.push_back(motion.arc);
+      out_.path.arcs.push_back(recorder_.arcs[static_cast<std::size_t>(motion.arc)]);
     }
     return point;
   }
@@ -293,12 +251,12 @@ class PathBuilder {
   }
 
   // A program whose first motion starts at a known place (an earlier lost motion ended there).
-  void add_start_point(const CanonicalMotion& motion, const PathPoint& like) {
+  void add_start_point(const MotionRecord::Start& from, const PathPoint& like, bool axis_vector) {
     PathPoint start = like;
-    start.words = motion.start;
-    if (motion.axis_vector) {
+    start.words = from.words;
+    if (axis_vector) {
       start.interpolation = PathInterpolation::rotary_linear;
-      set_location(start, motion.start, axis_of(motion.start_axis, motion.start, start));
+      set_location(start, from.words, axis_of(from.axis, from.words, start));
     }
     start.is_arc = false;
     start.arc = -1;
@@ -418,12 +376,13 @@ class PathBuilder {
     diagnostics_.push_back(std::move(d));
   }
 
-  Recorder& recorder_;
+  MotionRecord& recorder_;
   const InputSettings& settings_;
   InterpretedInput out_;
   std::optional<ReferencePath> reference_;
   Diagnostics diagnostics_;
   AxisMask programmed_ = 0;
+  std::size_t next_ = 0;  ///< motion that is added next
   std::size_t last_feed_ = 0;
   std::size_t end_ = static_cast<std::size_t>(-1);
   bool uses_tcp_ = false;
@@ -541,19 +500,25 @@ Result<InterpretedInput> interpret_nc(std::string text, const InputSettings& set
   }
   const auto dialect = dialect_of(text, settings);
   if (!dialect.ok()) return Result<InterpretedInput>::failure(dialect.diagnostics());
-  auto parsed = nc::parse(std::move(text), settings.file_name, dialect.value());
-  if (has_error(parsed.diagnostics))
-    return Result<InterpretedInput>::failure(std::move(parsed.diagnostics));
-  Recorder recorder;
-  const auto summary = nc::interpret(parsed.program, interpreter_settings(settings), recorder);
+  MotionRecord recorder;
+  nc::ProgramStream::Hooks hooks;
+  hooks.restart = [&] { recorder = {}; };
+  std::optional<nc::ProgramStream> program;
+  program.emplace(std::move(text), settings.file_name, dialect.value(), hooks);
+  const auto summary = nc::interpret(*program, interpreter_settings(settings), recorder);
+  if (has_error(program->diagnostics()))
+    return Result<InterpretedInput>::failure(program->diagnostics());
   Diagnostics diagnostics = dialect.diagnostics();
-  diagnostics.insert(diagnostics.end(), parsed.diagnostics.begin(), parsed.diagnostics.end());
+  diagnostics.insert(diagnostics.end(), program->diagnostics().begin(),
+                     program->diagnostics().end());
   diagnostics.insert(diagnostics.end(), summary.diagnostics().begin(), summary.diagnostics().end());
   if (!summary.ok()) return Result<InterpretedInput>::failure(std::move(diagnostics));
+  const std::size_t lines = program->program().block_count;
+  program.reset();  // the text and its pieces have been read
   auto built = PathBuilder(recorder, settings).run();
   diagnostics.insert(diagnostics.end(), built.diagnostics().begin(), built.diagnostics().end());
   if (!built.ok()) return Result<InterpretedInput>::failure(std::move(diagnostics));
-  built.value().lines = parsed.program.blocks.size();
+  built.value().lines = lines;
   built.value().dialect = dialect_name(dialect.value());
   for (const auto& file : summary.value().files)
     built.value().files.push_back({file.name, sha256(file.text), file.path});
@@ -564,7 +529,7 @@ namespace {
 
 /// The path of what a reader with a summary of its own called.
 template <typename Summary>
-Result<InterpretedInput> built_path(Recorder& recorder, const InputSettings& settings,
+Result<InterpretedInput> built_path(MotionRecord& recorder, const InputSettings& settings,
                                     const Summary& summary, Diagnostics diagnostics,
                                     const char* dialect) {
   auto built = PathBuilder(recorder, settings).run();
@@ -581,7 +546,7 @@ Result<InterpretedInput> built_path(Recorder& recorder, const InputSettings& set
 Result<InterpretedInput> interpret_heidenhain(std::string text, const InputSettings& settings) {
   nc::InterpreterSettings reader = interpreter_settings(settings);
   reader.inch_default = false;  // the text says its unit
-  Recorder recorder;
+  MotionRecord recorder;
   const auto summary = conversational::read(text, settings.file_name, reader, recorder);
   if (!summary.ok()) return Result<InterpretedInput>::failure(summary.diagnostics());
   return built_path(recorder, settings, summary.value(), summary.diagnostics(), "heidenhain");
@@ -591,7 +556,7 @@ Result<InterpretedInput> interpret_cl(std::string text, const InputSettings& set
   cl::ReaderSettings reader = settings.cl;
   if (settings.machine) reader.process = settings.machine->process;
   if (settings.process) reader.process = *settings.process;
-  Recorder recorder;
+  MotionRecord recorder;
   const auto summary = cl::read(text, settings.file_name, reader, recorder);
   if (!summary.ok()) return Result<InterpretedInput>::failure(summary.diagnostics());
   return built_path(recorder, settings, summary.value(), summary.diagnostics(), "");

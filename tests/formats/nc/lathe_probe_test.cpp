@@ -114,6 +114,7 @@ TEST_CASE("probing: what LinuxCNC refuses is refused", "[formats][nc][probe][ora
                                                       {"G93\nF1 G38.2 X5", "NC267"},
                                                       {"M3 S9 G95\nF1 G38.2 X5", "NC267"},
                                                       {"F100 G38.2 X0", "NC267"},
+                                                      {"F100 G38.4 X0", "NC267"},
                                                       {"F100 G1 X5 G41 D1\nX9\nG38.2 X20", "NC264"},
                                                       {"G38.2 X5", "NC213"},
                                                       {"F100 G38.2 X5 I3", "NC215"},
@@ -149,6 +150,7 @@ TEST_CASE("lathe and probing against rs274", "[formats][nc][lathe][oracle]") {
       "G21 S100 M3\nG7 G0 X10 Z0\nG76 P1 Z-10 I-2 J0.5 K1\nG33 Z-20 X12 K1",
       "G21 F100 G0 X0 Y0 Z10\nG38.2 Z-5\nG0 Z10\nG38.3 X[#5063] Y-7\nG0 X0 Y0 Z[#5070]\n"
       "G38.5 Z-3\nZ8\nG0 X1 Y1 Z1",
+      "G21 F100 G0 X0 Y0 Z10\nG38.3 Z10\nG38.5 X0\nG0 X[1+#5070]",
       "G21 F100 G10 L2 P1 X5 R90\nG0 X1 Y1 Z0\nG38.2 X2\nG0 X[#5061+1] Y[#5062] Z0"};
   for (const char* program : programs) agree(std::string(program) + "\nM2\n");
 }

@@ -376,6 +376,20 @@ TEST_CASE("interpret: motions that follow the spindle are refused with their lin
   }
 }
 
+TEST_CASE("interpret: probing motions are refused with the line of the first",
+          "[postproc][pipeline]") {
+  for (const char* code : {"G38.2", "G38.3", "G38.4", "G38.5"}) {
+    const auto r = interpret_nc("%\nG21 G90 F100\nG0 X0 Y0 Z0 A0 C0\n" + std::string(code) +
+                                    " Z-5\nX[#5063]\nG0 Z5\nM30\n%\n",
+                                posted_for("table_table_ac"));
+    INFO(code);
+    REQUIRE_FALSE(r.ok());
+    REQUIRE(r.diagnostics().size() == 1);
+    CHECK(r.diagnostics().front().code == "NC317");
+    CHECK(r.diagnostics().front().where.line == 4);
+  }
+}
+
 TEST_CASE("interpret: the tool's centre under cutter radius compensation", "[postproc][pipeline]") {
   const auto r =
       interpret_nc("%\nG21 G90 F600\nG0 X0 Y0 Z0\nG41.1 D4\nG1 X10\nY10\nG40\nG0 X0\nM30\n%\n", {});
