@@ -265,7 +265,7 @@ Comparison compare(const std::vector<CanonicalMotion>& ours, const OracleRun& or
   for (const CanonicalMotion& mine : ours) {
     while (k < theirs_all.size() && standstill(k) &&
            ((mine.kind == MotionKind::rapid) != theirs_all[k].rapid ||
-            distance(end_of(mine), theirs_all[k].end) > tolerance)) {
+            distance(end_of(mine), theirs_all[k].end) > tolerance + theirs_all[k].slack)) {
       ++k;
     }
     if (k == theirs_all.size()) {
