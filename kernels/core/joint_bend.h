@@ -10,4 +10,15 @@ namespace smoothpost {
 /// straight. mm or rad.
 using JointBend = Eigen::Matrix<double, Eigen::Dynamic, 4>;
 
+/// How two linear joints go round a centre instead, on τ ∈ [0, 1]: with polar coordinates (ρ, φ) of
+/// (first, second) about the centre both are linear in τ, ρ from that of q0 to that of q1, φ in the
+/// sense of `turn` by the angle in (0, 2π] that takes the direction of q0 to that of q1. The other
+/// joints stay straight: with a third linear joint that moves it is a helix. Positions in mm.
+struct JointArc {
+  int turn =
+      0;  ///< 1: from the first joint's positive direction to the second's, −1: back; 0: none
+  int first = 0, second = 0;
+  double centre_first = 0.0, centre_second = 0.0;
+};
+
 }  // namespace smoothpost
