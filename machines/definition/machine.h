@@ -148,7 +148,8 @@ struct DialectSettings {
   std::vector<std::string> end;
   bool offset_guard = true;
   std::string path_mode = "exact";  ///< exact | blend | spline
-  std::string curves = "lines";  ///< lines | cubic | quintic: what scheduled blocks of joints are
+  std::string curves =
+      "lines";  ///< lines | arcs | cubic | quintic: what scheduled blocks of joints are
 };
 
 /// Tip speed (mm/s) to power (percent), monotone; empty when the machine has no beam power.

@@ -328,7 +328,8 @@ DialectSettings read_dialect(TableReader reader, const CycleSettings& cycle) {
   dialect.offset_guard = reader.boolean("offset_guard").value_or(dialect.offset_guard);
   dialect.path_mode =
       reader.choice("path_mode", {"exact", "blend", "spline"}).value_or(dialect.path_mode);
-  dialect.curves = reader.choice("curves", {"lines", "cubic", "quintic"}).value_or(dialect.curves);
+  dialect.curves =
+      reader.choice("curves", {"lines", "arcs", "cubic", "quintic"}).value_or(dialect.curves);
   reader.finish();
   return dialect;
 }

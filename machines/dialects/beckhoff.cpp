@@ -50,11 +50,13 @@ class Emitter : public gcode::GcodePrinter {
     block("#HSC OFF");
     block("#TRAFO OFF");
     block(std::string(is_inch() ? "G70" : "G71") + " G17 G90 G40 G53 D0 G360 G94");
+    if (has_arcs()) block("G162");
     timed_ = false;
     words().forget();
   }
 
   void foot() override {
+    leave_plane();
     if (timed_) block("G94");
     bool ended = false;
     for (const auto& own : machine().dialect.end) {
@@ -66,6 +68,7 @@ class Emitter : public gcode::GcodePrinter {
   }
 
   void label(const std::string& text) override {
+    leave_plane();
     comment(text);
     modal_words();
   }
@@ -73,6 +76,7 @@ class Emitter : public gcode::GcodePrinter {
   void dwell(double seconds) override { block("#TIME " + decimal_text(seconds, 4)); }
 
   void statement(const std::string& text, const MachineAction& action) override {
+    leave_plane();
     block(text);
     if (action.event.name != event_name::kToolChange) return;
     block("D0");  // the control may have chosen the tool's own compensation
@@ -82,7 +86,8 @@ class Emitter : public gcode::GcodePrinter {
     const MachineMove& m = move(i);
     if (timed_ == m.rapid) block(m.rapid ? "G94" : "G93");
     timed_ = !m.rapid;
-    std::string text = (m.rapid ? "G0" : "G1") + words().joints(m.joints, m.to);
+    const ArcCode arc = m.arc.turn != 0 ? arc_code(m, move(i - 1).to) : ArcCode{"G1", ""};
+    std::string text = (m.rapid ? "G0" : arc.code) + words().joints(m.joints, m.to) + arc.centre;
     if (!m.rapid) {
       const double least = std::pow(10.0, -kTimeDigits);
       text += " F" + decimal_text(std::max(m.duration, least), kTimeDigits);
@@ -121,7 +126,7 @@ class Reading : public gcode::GcodeReading {
   }
 
   bool read_setting(const Block& block) override {
-    static const std::set<double> kCodes = {17, 40, 53, 70, 71, 90, 93, 94, 360};
+    static const std::set<double> kCodes = {17, 40, 53, 70, 71, 90, 93, 94, 162, 360};
     for (const auto& word : block.words) {
       const bool code = word.letter == 'G' && kCodes.count(word.value) > 0;
       if (!code && !(word.letter == 'D' && word.value == 0.0)) return false;
@@ -134,6 +139,7 @@ class Reading : public gcode::GcodeReading {
       if (g == 70.0 || g == 71.0) scale_ = g == 70.0 ? kMillimetresPerInch : 1.0;
       if (g == 70.0 || g == 71.0) unit_ = true;
       if (g == 90.0) absolute_ = true;
+      if (g == 162.0) from_start_ = true;
       if (g == 93.0 || g == 94.0) timed_ = g == 93.0;
       if (g == 360.0) exact_ = result.moves.empty() || exact_;
     }
@@ -145,19 +151,28 @@ class Reading : public gcode::GcodeReading {
       return error(
           block.at,
           "a motion stands before #HSC OFF, #TRAFO OFF, G71 or G70, G90, G53, D0 and G360");
-    for (const auto& word : block.words)
-      if (word.letter == 'G' && word.value != 0.0 && word.value != 1.0)
-        return error(block.at, "only G0 and G1 move the axes of this program");
+    const bool arc = is_arc(block);
+    for (const auto& word : block.words) {
+      if (word.letter != 'G') continue;
+      const bool own =
+          arc ? word.value == 2.0 || word.value == 3.0 || (word.value >= 17.0 && word.value <= 19.0)
+              : word.value == 0.0 || word.value == 1.0;
+      if (!own) return error(block.at, "only G0, G1, G2 and G3 move the axes of this program");
+    }
+    if (arc && !from_start_)
+      return error(block.at, "an arc before G162: its centre may be meant absolutely");
     ReadBackMove move = new_move(block.at);
     move.rapid = block.has('G', 0.0);
     const Word* f = block.find('F');
     if (move.rapid == (f != nullptr))
-      return error(block.at, "F belongs to G1, and to each of them");
+      return error(block.at, "F belongs to G1, G2 and G3, and to each of them");
     if (f != nullptr && (f->value <= 0.0 || !timed_))
-      return error(block.at, "G1 needs G93 and F above 0");
-    if (!take_axes(block, {"GF", scale_, Vec3::Zero()})) return;
+      return error(block.at, "G1, G2 and G3 need G93 and F above 0");
+    const ArcStart start{joints(), known(), scale_};
+    if (!take_axes(block, {arc ? "GFIJKRP" : "GF", scale_, Vec3::Zero()})) return;
     move.to = joints();
     move.known = known();
+    if (arc && !take_arc(block, start, move)) return;
     if (f != nullptr) move.duration = f->value;
     result.moves.push_back(std::move(move));
   }
@@ -171,6 +186,7 @@ class Reading : public gcode::GcodeReading {
   bool no_tool_ = false;
   bool exact_ = false;
   bool timed_ = false;
+  bool from_start_ = false;  // G162
 };
 
 }  // namespace
@@ -193,6 +209,8 @@ const Dialect kDialect = {
     &emit,
     &read_back,
     "the program cancels zero offsets, tool and transformation (G53, D0, #TRAFO OFF); shifts of "
-    "another kind are not live"};
+    "another kind are not live",
+    false,
+    true};
 
 }  // namespace smoothpost::beckhoff

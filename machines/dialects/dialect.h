@@ -52,6 +52,8 @@ struct MachineMove {
                         ///< joins by a smooth curve of its own
   JointBend bend;       ///< interpolation joints: polynomials in the place of straight joints; only
                         ///< dialects with `polynomials` print them
+  JointArc arc;  ///< interpolation joints: two linear joints along an arc; only dialects with
+                 ///< `arcs` print them
   double duration = 0.0;      ///< s; 0 for a rapid
   std::int32_t stretch = -1;  ///< role path: number of the stretch of the feed schedule; −1: none
   double stretch_time = 0.0;  ///< s, of that stretch at the end of the move
@@ -102,8 +104,10 @@ struct ReadBackMove {
   double blend = 0.0;         ///< mm, as MachineMove::blend
   bool spline = false;        ///< as MachineMove::spline
   JointBend bend;             ///< as MachineMove::bend
-  Eigen::VectorXd deviation;  ///< a step in the place of a part of a bent move: no joint is further
-                              ///< from the straight way than this; empty: 0
+  JointArc arc;               ///< as MachineMove::arc
+  Eigen::VectorXd deviation;  ///< a step in the place of a part of a bent move or an arc: no joint
+                              ///< is further from the straight way than this; empty: 0
+  double spread = 0.0;        ///< mm of it on the joints of an arc: radii differ (arc_spread())
   double duration = 0.0;      ///< s, from F; 0 for a rapid
   std::uint32_t line = 0;
 };
@@ -148,6 +152,7 @@ struct Dialect {
                                 const std::string& file_name);
   const char* guard;         ///< what the program's guard makes sure of, for the certificate
   bool polynomials = false;  ///< prints MachineMove::bend
+  bool arcs = false;         ///< prints MachineMove::arc
 };
 
 }  // namespace smoothpost

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "kernels/core/units.h"
+#include "kernels/spline/bent_move.h"
 #include "machines/dialects/decimal.h"
 #include "machines/dialects/gcode_program.h"
 #include "machines/dialects/tool_words.h"
@@ -54,6 +55,8 @@ class Emitter : public gcode::GcodePrinter {
       if (kAxisLetters.find(axis.letter) == std::string_view::npos)
         refuse("PR203", "axis " + axis.name + " has the letter " + std::string(1, axis.letter) +
                             ": this dialect has the axis words " + std::string(kAxisLetters));
+    if (has_arcs() && has_poses())
+      refuse("PR203", "arcs stand in programs of joint words only: write dialect.mode = \"joint\"");
     for (const auto& m : program().moves) check_move(m);
   }
 
@@ -97,6 +100,7 @@ class Emitter : public gcode::GcodePrinter {
   }
 
   void foot() override {
+    leave_plane();
     if (mode_ == Mode::tool) block("G49");
     if (inverse_time_) block("G94");
     block("G05.1 Q0");
@@ -164,12 +168,14 @@ class Emitter : public gcode::GcodePrinter {
   void dwell(double seconds) override { block("G4 X" + words().number(seconds, 3)); }
 
   void label(const std::string& text) override {
+    leave_plane();
     if (mode_ == Mode::tool) block("G49");
     comment(text);
     modal_words();
   }
 
   void statement(const std::string& text, const MachineAction& action) override {
+    leave_plane();
     const bool change = action.event.name == event_name::kToolChange;
     if (change && mode_ == Mode::tool) block("G49");
     block(text);
@@ -212,24 +218,35 @@ class Emitter : public gcode::GcodePrinter {
   }
 
   void print_move(std::size_t i) override {
-    is_tool(move(i)) ? print_tool(move(i)) : print_joints(move(i));
+    is_tool(move(i)) ? print_tool(move(i)) : print_joints(i);
   }
 
-  void print_joints(const MachineMove& m) {
+  void print_joints(std::size_t i) {
+    const MachineMove& m = move(i);
     // The first block behind G49 takes the tool's length out of every linear axis.
     const bool leaves = mode_ == Mode::tool;
     const bool machine_words = m.rapid && (has_poses() || m.machine_coordinates);
     if (leaves || machine_words) words().forget();
     set_time_mode(!m.rapid);
     std::string text = leaves ? "G49 " : "";
-    text += machine_words ? "G53 G0" : m.rapid ? "G0" : "G1";
+    const ArcCode arc = m.arc.turn != 0 ? arc_code(m, move(i - 1).to) : ArcCode{"G1", ""};
+    text += machine_words ? "G53 G0" : m.rapid ? "G0" : arc.code;
     text += words().joints(leaves ? m.joints | tip_joints_ : m.joints, m.to,
                            machine_words ? Vec3(Vec3::Zero()) : shift_);
     if (machine_words) words().forget();
-    if (!m.rapid) text += inverse_time(std::max(m.duration, kShortestBlock));
+    text += arc.centre;
+    if (!m.rapid) text += inverse_time(std::max(time_of_feed(i), kShortestBlock));
     block(text);
     mode_ = Mode::joints;
     tool_words_.stand(m);
+  }
+
+  // s: F of an arc is the speed over its radius, so one over the time of one radian.
+  double time_of_feed(std::size_t i) const {
+    const MachineMove& m = move(i);
+    if (m.arc.turn == 0) return m.duration;
+    const JointBend none;
+    return m.duration / std::abs(arc_shape({move(i - 1).to, m.to, none, m.arc}).sweep);
   }
 
   void print_tool(const MachineMove& m) {
@@ -281,7 +298,8 @@ const Dialect kDialect = {
     "fanuc_30i",    "FANUC 30i/31i, joint words in G93, or G43.4 P1 with rotary positions, G61",
     kInterpolation, ToolTurn::great_circle,
     true,           &emit,
-    &read_back,     kGuardText};
+    &read_back,     kGuardText,
+    false,          true};
 
 const Dialect kVectorDialect = {
     "fanuc_30i_vectors",
@@ -291,6 +309,8 @@ const Dialect kVectorDialect = {
     true,
     &emit,
     &read_back,
-    kGuardText};
+    kGuardText,
+    false,
+    true};
 
 }  // namespace smoothpost::fanuc_30i

@@ -6,6 +6,7 @@
 
 #include "kernels/core/units.h"
 #include "kernels/kinematics/screw_chain.h"
+#include "kernels/spline/bent_move.h"
 #include "machines/dialects/fanuc_30i.h"
 #include "machines/dialects/gcode_program.h"
 #include "machines/dialects/tool_words.h"
@@ -216,17 +217,24 @@ class Reading : public gcode::GcodeReading {
       if (word.letter != 'G') continue;
       if (word.value == 49.0)
         leave_centre(block);
-      else if (word.value != 0.0 && word.value != 1.0 && word.value != 53.0)
+      else if (is_arc(block) ? !is_arc_code(word.value)
+                             : word.value != 0.0 && word.value != 1.0 && word.value != 53.0)
         return error(block.at, "G" + decimal_word(word.value) + " is not one of ours in a motion");
     }
     ReadBackMove move = new_move(block.at);
     move.rapid = block.has('G', 0.0);
     const Word* f = block.find('F');
     if (move.rapid == (f != nullptr))
-      return error(block.at, "F belongs to G1, and to each of them");
+      return error(block.at, "F belongs to G1, G2 and G3, and to each of them");
+    if (is_arc(block) && (centre_live() || guard_.place()))
+      return error(block.at, "an arc in a program of tool moves is not one of ours");
     if (f != nullptr && f->value <= 0.0) return error(block.at, "F has to be above 0");
     const bool good = centre_live() ? read_pose(block, f, move) : read_joints(block, f, move);
     if (good) result.moves.push_back(std::move(move));
+  }
+
+  static bool is_arc_code(double code) {
+    return code == 2.0 || code == 3.0 || (code >= 17.0 && code <= 19.0);
   }
 
   static std::string decimal_word(double value) {
@@ -252,10 +260,17 @@ class Reading : public gcode::GcodeReading {
       if (const auto place = guard_.place()) shift = *place * scale_;
       if (unplaced_line_ == 0) unplaced_line_ = block.at.line;
     }
-    if (!take_axes(block, {"GF", scale_, shift})) return false;
+    const ArcStart start{joints(), known(), scale_};
+    if (!take_axes(block, {is_arc(block) ? "GFIJKRP" : "GF", scale_, shift})) return false;
     if (f != nullptr) move.duration = kSecondsPerMinute / f->value;
     move.to = joints();
     move.known = known();
+    if (is_arc(block)) {
+      if (!take_arc(block, start, move)) return false;
+      // F is the speed over the radius.
+      const JointBend none;
+      move.duration *= std::abs(arc_shape({start.joints, move.to, none, move.arc}).sweep);
+    }
     find_tip();
     return true;
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "kernels/core/units.h"
+#include "machines/dialects/arc_text.h"
 
 namespace smoothpost::gcode {
 
@@ -21,7 +22,11 @@ bool is_stop(std::string_view statement) {
 
 GcodePrinter::GcodePrinter(const MachineDefinition& machine, const MachineProgram& program,
                            AxisWords::Style style, Numbers numbers)
-    : ProgramPrinter(machine, program), words_(machine, style), numbers_(numbers) {}
+    : ProgramPrinter(machine, program),
+      words_(machine, style),
+      numbers_(numbers),
+      has_arcs_(std::any_of(program.moves.begin(), program.moves.end(),
+                            [](const MachineMove& m) { return m.arc.turn != 0; })) {}
 
 void GcodePrinter::block(std::string_view words) {
   if (machine().dialect.line_numbers && number_ + numbers_.step <= numbers_.last) {
@@ -51,6 +56,21 @@ void GcodePrinter::statement(const std::string& words, const MachineAction&) { b
 std::string GcodePrinter::inverse_time(double seconds) const {
   const double f = kSecondsPerMinute / seconds;
   return " F" + words_.number(f, decimals_for(f, 8, 3, 7));
+}
+
+GcodePrinter::ArcCode GcodePrinter::arc_code(const MachineMove& move, const JointVector& from) {
+  const ArcWords arc = arc_words(machine(), move.arc, from);
+  plane_ = arc.plane.code;
+  const auto centre = [this](char letter, double value) {
+    return std::string(" ") + letter + words_.number(value, machine().dialect.digits_length);
+  };
+  return {"G" + std::to_string(arc.plane.code) + (arc.clockwise ? " G2" : " G3"),
+          centre(arc.plane.first_centre, arc.first) + centre(arc.plane.second_centre, arc.second)};
+}
+
+void GcodePrinter::leave_plane() {
+  if (plane_ != 17) block("G17");
+  plane_ = 17;
 }
 
 GcodeReading::GcodeReading(const MachineDefinition& machine, const std::string& file)
@@ -115,6 +135,32 @@ bool GcodeReading::take_axes(const Block& block, const AxisRule& rule) {
   }
   if (count == 0) return error(block.at, "a motion without axis words"), false;
   return true;
+}
+
+bool GcodeReading::take_arc(const Block& block, const ArcStart& start, ReadBackMove& move) {
+  ArcBlock arc;
+  arc.clockwise = block.has('G', 2.0);
+  int planes = 0;
+  for (const int code : {17, 18, 19})
+    if (block.has('G', code)) {
+      arc.code = code;
+      ++planes;
+    }
+  if (planes != 1) return error(block.at, "an arc has to name its plane: G17, G18 or G19"), false;
+  const char* centres = arc.code == 17 ? "IJ" : arc.code == 18 ? "KI" : "JK";
+  for (const char letter : {'I', 'J', 'K', 'R', 'P'}) {
+    const bool wanted = letter == centres[0] || letter == centres[1];
+    if ((block.find(letter) != nullptr) == wanted) continue;
+    return error(block.at, std::string("an arc in G") + std::to_string(arc.code) +
+                               " has its centre in " + centres[0] + " and " + centres[1] +
+                               " and nothing else: not " + letter),
+           false;
+  }
+  arc.first = block.find(centres[0])->value * start.scale;
+  arc.second = block.find(centres[1])->value * start.scale;
+  const std::string problem = set_arc(machine(), arc, start.joints, start.known, move);
+  if (!problem.empty()) error(block.at, problem);
+  return problem.empty();
 }
 
 void GcodeReading::dwell(const Block& block, const Word* seconds, double unit) {

@@ -32,11 +32,21 @@ class GcodePrinter : public ProgramPrinter {
   const AxisWords& words() const { return words_; }
   /// F of a block that lasts `seconds`, as one over minutes, with its letter.
   std::string inverse_time(double seconds) const;
+  /// The words of an arc that begins at `from`: "G17 G2" and " I1.5 J-2".
+  struct ArcCode {
+    std::string code, centre;
+  };
+  ArcCode arc_code(const MachineMove& move, const JointVector& from);
+  /// G17 again, if an arc has chosen another plane: words of the machine file may rely on it.
+  void leave_plane();
+  bool has_arcs() const { return has_arcs_; }
   bool is_inch() const { return machine().dialect.units == "inch"; }
 
  private:
   AxisWords words_;
   Numbers numbers_;
+  bool has_arcs_ = false;
+  int plane_ = 17;
   std::uint32_t number_ = 0;
 };
 
@@ -68,6 +78,16 @@ class GcodeReading : public ProgramReading {
     Vec3 shift = Vec3::Zero();
   };
   bool take_axes(const Block& block, const AxisRule& rule);
+  /// The arc of a block with G2 or G3 whose axes have been taken into `move`, from where they stood
+  /// before. It has to name its plane (G17, G18 or G19), both centre words of it from the start,
+  /// and no others of I J K R P. False after an error.
+  struct ArcStart {
+    JointVector joints;
+    JointMask known = 0;
+    double scale = 1.0;  ///< makes mm of a length
+  };
+  bool take_arc(const Block& block, const ArcStart& start, ReadBackMove& move);
+  static bool is_arc(const Block& block) { return block.has('G', 2.0) || block.has('G', 3.0); }
   /// A dwell of `seconds`, with an error unless they are a number from 0 on.
   void dwell(const Block& block, const Word* seconds, double unit);
 

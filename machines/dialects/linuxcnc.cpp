@@ -4,11 +4,14 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "formats/nc/interpreter.h"
 #include "formats/nc/program_stream.h"
 #include "kernels/core/units.h"
+#include "kernels/spline/bent_move.h"
+#include "machines/dialects/arc_text.h"
 #include "machines/dialects/decimal.h"
 #include "machines/dialects/event_text.h"
 
@@ -80,6 +83,8 @@ class Emitter {
     length_scale_ = inch ? 1.0 / kMillimetresPerInch : 1.0;
     out_.move_lines.reserve(program.moves.size());
     out_.text.reserve(64 * program.moves.size() + 4096);
+    has_arcs_ = std::any_of(program.moves.begin(), program.moves.end(),
+                            [](const MachineMove& m) { return m.arc.turn != 0; });
   }
 
   Result<EmittedProgram> run() {
@@ -88,9 +93,10 @@ class Emitter {
     for (std::size_t i = 0; i <= program_.moves.size(); ++i) {
       for (; action < program_.actions.size() && program_.actions[action].before == i; ++action)
         print_action(program_.actions[action]);
-      if (i < program_.moves.size()) print_move(program_.moves[i]);
+      if (i < program_.moves.size()) print_move(i);
     }
     set_time_mode(false);
+    leave_plane();
     for (const auto& line : machine_.dialect.end) put_line(line);
     put_line("%");
     out_.line_count = line_;
@@ -119,6 +125,7 @@ class Emitter {
   void modal_block() {
     const bool inch = machine_.dialect.units == "inch";
     put_line(std::string(inch ? "G20" : "G21") + " G90 G94 G40 G49 G80 G92.1 G54");
+    if (has_arcs_) put_line("G91.1");
     put_line(machine_.dialect.path_mode == "exact" ? "G61" : "G64 P0.001 Q0");
     inverse_time_ = false;
   }
@@ -126,6 +133,7 @@ class Emitter {
   // From here on every mode and every axis word is stated anew.
   void print_label(const MachineAction& action) {
     set_time_mode(false);
+    leave_plane();
     put_line("(" + comment_text(action.text) + ")");
     modal_block();
     for (auto& word : printed_) word.clear();
@@ -148,6 +156,12 @@ class Emitter {
     if (inverse == inverse_time_) return;
     put_line(inverse ? "G93" : "G94");
     inverse_time_ = inverse;
+  }
+
+  // Words of the machine file may rely on G17.
+  void leave_plane() {
+    if (plane_ != 17) put_line("G17");
+    plane_ = 17;
   }
 
   void print_action(const MachineAction& action) {
@@ -175,6 +189,7 @@ class Emitter {
     const auto event = event_text(machine_, action, diagnostics_);
     if (!event) return;
     if (event->is_comment) return put_line("(" + comment_text(event->text) + ")");
+    leave_plane();
     number(action.input_line);
     put_line(event->text);
     if (event->dwell > 0.0) {
@@ -184,7 +199,8 @@ class Emitter {
     }
   }
 
-  void print_move(const MachineMove& move) {
+  void print_move(std::size_t i) {
+    const MachineMove& move = program_.moves[i];
     std::string words;
     for (int j = 0; j < machine_.size(); ++j)
       if (move.joints >> j & 1U) axis_word(words, j, move.to[j]);
@@ -195,11 +211,10 @@ class Emitter {
     set_time_mode(!move.rapid);
     number(move.input_line);
     if (move.machine_coordinates) out_.text += "G53 ";
-    if (move.rapid)
-      out_.text += "G0";
+    if (move.arc.turn != 0)
+      arc_block(move, program_.moves[i - 1].to, words);
     else
-      out_.text += "G1";
-    out_.text += words;
+      out_.text += (move.rapid ? "G0" : "G1") + words;
     if (!move.rapid) {
       out_.text += " F";
       const double f = kSecondsPerMinute / move.duration;
@@ -207,6 +222,16 @@ class Emitter {
     }
     put_line("");
     out_.move_lines.push_back(line_);
+  }
+
+  void arc_block(const MachineMove& move, const JointVector& from, const std::string& words) {
+    const ArcWords arc = arc_words(machine_, move.arc, from);
+    plane_ = arc.plane.code;
+    out_.text += "G" + std::to_string(arc.plane.code) + (arc.clockwise ? " G2" : " G3") + words;
+    out_.text += std::string(" ") + arc.plane.first_centre;
+    append_decimal(out_.text, arc.first, machine_.dialect.digits_length);
+    out_.text += std::string(" ") + arc.plane.second_centre;
+    append_decimal(out_.text, arc.second, machine_.dialect.digits_length);
   }
 
   // Words that would print the same digits as before are left out, except when nothing else is
@@ -231,6 +256,8 @@ class Emitter {
   std::vector<std::string> printed_;
   double length_scale_ = 1.0;
   bool inverse_time_ = false;
+  bool has_arcs_ = false;
+  int plane_ = 17;
   std::uint32_t line_ = 0;
   EmittedProgram out_;
   Diagnostics diagnostics_;
@@ -239,7 +266,8 @@ class Emitter {
 /// Collects what the interpreter says of joint words.
 class ReadBackSink : public CanonicalSink {
  public:
-  explicit ReadBackSink(const MachineDefinition& machine) : machine_(machine) {
+  ReadBackSink(const MachineDefinition& machine, const std::set<std::uint32_t>& radius_lines)
+      : machine_(machine), radius_lines_(radius_lines) {
     for (int j = 0; j < machine.size(); ++j)
       word_[static_cast<std::size_t>(j)] =
           static_cast<int>(kAxisLetters.find(machine.axes[static_cast<std::size_t>(j)].letter));
@@ -257,7 +285,9 @@ class ReadBackSink : public CanonicalSink {
     move.beam = beam_;
     move.duration = motion.duration;
     move.line = motion.line;
-    if (motion.is_arc) error(motion.line, "an arc in joint words is not certified: write G1 moves");
+    if (motion.is_arc) read_arc(motion, move);
+    here_ = move.to;
+    known_ = move.known;
     result.moves.push_back(std::move(move));
     result.last_line = motion.line;
   }
@@ -282,6 +312,26 @@ class ReadBackSink : public CanonicalSink {
   Diagnostics diagnostics;
 
  private:
+  void read_arc(const CanonicalMotion& motion, ReadBackMove& move) {
+    if (radius_lines_.count(motion.line) > 0)
+      return error(motion.line,
+                   "an arc by its radius is not certified, its centre is not exact near half a "
+                   "circle: write I J K");
+    if (std::abs(motion.arc.sweep) > kMostSweep + 1e-9)
+      return error(motion.line, "an arc of more than 270 deg is not certified: divide it");
+    Eigen::Index third = 0;
+    motion.arc.normal.cwiseAbs().maxCoeff(&third);
+    constexpr std::array<int, 3> kCodes = {19, 18, 17};
+    ArcBlock block;
+    block.code = kCodes[static_cast<std::size_t>(third)];
+    block.clockwise = motion.arc.sweep * motion.arc.normal[third] < 0.0;
+    const auto first = (third + 1) % 3, second = (third + 2) % 3;
+    block.first = motion.arc.centre[first] - motion.start[static_cast<std::size_t>(first)];
+    block.second = motion.arc.centre[second] - motion.start[static_cast<std::size_t>(second)];
+    const std::string problem = set_arc(machine_, block, here_, known_, move);
+    if (!problem.empty()) error(motion.line, problem);
+  }
+
   void add(std::string name, double seconds, std::uint32_t line) {
     result.events.push_back({result.moves.size(), std::move(name), seconds, beam_, line});
     result.last_line = line;
@@ -295,7 +345,10 @@ class ReadBackSink : public CanonicalSink {
   }
 
   const MachineDefinition& machine_;
+  const std::set<std::uint32_t>& radius_lines_;
   std::array<int, kMaxJoints> word_{};
+  JointVector here_;
+  JointMask known_ = 0;
   bool beam_ = false;
 };
 
@@ -335,6 +388,17 @@ void note_computed_words(const nc::Program& program, Diagnostics& diagnostics) {
   }
 }
 
+void note_lines_with_radius(const nc::Program& program, std::set<std::uint32_t>& lines) {
+  for (std::size_t i = 0; i < program.blocks.size(); ++i) {
+    const nc::Block& block = program.blocks[i];
+    for (std::uint32_t k = 0; k < block.piece_count; ++k) {
+      const nc::Piece& piece = program.pieces[block.first_piece + k];
+      if (piece.kind == nc::PieceKind::word && piece.letter == 'R')
+        lines.insert(static_cast<std::uint32_t>(program.first_block + i + 1));
+    }
+  }
+}
+
 // Exact path holds when the first path mode word stands before the first motion, is G61, and no
 // other path mode follows.
 struct ExactPath {
@@ -347,7 +411,7 @@ struct ExactPath {
       if (piece.kind != nc::PieceKind::word || piece.letter != 'G') continue;
       if (piece.value == 61.0) began = true;
       if (piece.value == 64.0 || piece.value == 61.1) broken = true;
-      if ((piece.value == 0.0 || piece.value == 1.0) && !began) broken = true;
+      if (piece.value >= 0.0 && piece.value <= 3.0 && !began) broken = true;
     }
   }
 };
@@ -363,15 +427,18 @@ Result<ReadBack> read_back(const MachineDefinition& machine, std::string text,
   const bool guard = take_guard(text);
   Diagnostics computed;
   ExactPath exact_path;
-  std::optional<ReadBackSink> sink(std::in_place, machine);
+  std::set<std::uint32_t> with_radius;
+  std::optional<ReadBackSink> sink(std::in_place, machine, with_radius);
   nc::ProgramStream::Hooks hooks;
-  hooks.restart = [&] { sink.emplace(machine); };
+  hooks.restart = [&] { sink.emplace(machine, with_radius); };
   hooks.look = [&](const nc::Program& window) {
     if (window.first_block == 0) {
       computed.clear();
+      with_radius.clear();
       exact_path = {};
     }
     note_computed_words(window, computed);
+    note_lines_with_radius(window, with_radius);
     exact_path.look_at(window);
   };
   nc::ProgramStream program(std::move(text), file_name, nc::InputDialect::linuxcnc, hooks);
@@ -410,6 +477,8 @@ const Dialect kDialect = {"linuxcnc",
                           &emit,
                           &read_back,
                           "every work, G92 and tool offset of the controller is zero: the program "
-                          "aborts before its first motion otherwise"};
+                          "aborts before its first motion otherwise",
+                          false,
+                          true};
 
 }  // namespace smoothpost::linuxcnc

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/core/units.h"
+#include "machines/dialects/arc_text.h"
 #include "machines/dialects/decimal.h"
 #include "machines/dialects/event_text.h"
 #include "machines/dialects/zyx_angles.h"
@@ -51,7 +52,7 @@ class Emitter {
     for (std::size_t i = 0; i <= program_.moves.size(); ++i) {
       for (; action < program_.actions.size() && program_.actions[action].before == i; ++action)
         print_action(program_.actions[action]);
-      if (i < program_.moves.size()) print_move(program_.moves[i]);
+      if (i < program_.moves.size()) print_move(i);
     }
     footer();
     out_.line_count = line_;
@@ -75,6 +76,10 @@ class Emitter {
     const bool bent_rapid =
         std::any_of(program_.moves.begin(), program_.moves.end(),
                     [](const MachineMove& m) { return m.rapid && m.bend.rows() > 0; });
+    const bool arcs = std::any_of(program_.moves.begin(), program_.moves.end(),
+                                  [](const MachineMove& m) { return m.arc.turn != 0; });
+    if (arcs && has_poses_)
+      refuse("arcs stand in programs of joint words only: write dialect.mode = \"joint\"");
     if (bent_rapid) refuse("a rapid along polynomials has no words in dialect siemens_840d");
     if (has_bends_ && has_poses_)
       refuse("polynomials stand in programs of joint words only: write dialect.mode = \"joint\"");
@@ -107,6 +112,7 @@ class Emitter {
   // Everything that motions rely on except frame, tool and transformation, which each kind of move
   // sets for itself.
   void modal_words() {
+    plane_ = 17;
     put_block("TRAFOOF");
     const bool inch = machine_.dialect.units == "inch";
     put_block(std::string("G17 ") + (inch ? "G700" : "G710") + " G90 G94 G40 G60 G601 " +
@@ -207,6 +213,7 @@ class Emitter {
   void comment(std::string_view text) { put_line("; " + plain_text(text, kMaxComment)); }
 
   void footer() {
+    leave_plane();
     if (mode_ != Mode::joints) put_block("TRAFOOF");
     if (inverse_time_) put_block("G94");
     bool ended = false;
@@ -231,9 +238,16 @@ class Emitter {
     const auto event = event_text(machine_, action, diagnostics_);
     if (!event) return;
     if (event->is_comment) return comment(event->text);
+    leave_plane();
     put_block(event->text);
     if (action.event.name == event_name::kToolChange) after_tool_change();
     if (event->dwell > 0.0) put_block("G4 F" + decimal(event->dwell, 4));
+  }
+
+  // Words of the machine file may rely on G17.
+  void leave_plane() {
+    if (plane_ != 17) put_block("G17");
+    plane_ = 17;
   }
 
   // The control may have selected a D of its own.
@@ -265,6 +279,7 @@ class Emitter {
     for (int n = 2; std::find(labels_.begin(), labels_.end(), unique) != labels_.end(); ++n)
       unique = label + "_" + std::to_string(n);
     labels_.push_back(unique);
+    leave_plane();
     put_block(unique + ": ; " + plain_text(text, kMaxComment));
     modal_words();
     if (!has_poses_) put_block("G500 D0");
@@ -292,19 +307,35 @@ class Emitter {
     inverse_time_ = inverse;
   }
 
-  void print_move(const MachineMove& move) {
+  void print_move(std::size_t i) {
+    const MachineMove& move = program_.moves[i];
     const bool tool = move.interpolation == MoveInterpolation::tool;
     set_mode(tool ? Mode::tool : Mode::joints);
     set_time_mode(!move.rapid);
     const bool bent = degree(move) > 1;
-    std::string block = move.rapid ? "G0" : bent ? "POLY" : "G1";
-    block += tool ? tool_words(move) : bent ? bent_words(move) : joint_words(move);
+    const auto [code, centre] = arc_code(i);
+    std::string block = move.rapid ? "G0" : bent ? "POLY" : code;
+    block += tool ? tool_words(move) : bent ? bent_words(move) : joint_words(move) + centre;
     if (!move.rapid) {
       const double f = kSecondsPerMinute / move.duration;
       block += " F" + decimal(f, f < 10.0 ? 7 : f < 1000.0 ? 5 : 3);
     }
     put_block(block);
     out_.move_lines.push_back(line_);
+  }
+
+  // "G17 G2" and " I1.5 J-2"; the centre from the start.
+  std::pair<std::string, std::string> arc_code(std::size_t i) {
+    const MachineMove& move = program_.moves[i];
+    if (move.arc.turn == 0) return {"G1", ""};
+    const ArcWords arc = arc_words(machine_, move.arc, program_.moves[i - 1].to);
+    plane_ = arc.plane.code;
+    const auto centre = [this](char letter, double value) {
+      return std::string(" ") + letter + decimal(value, machine_.dialect.digits_length);
+    };
+    return {
+        "G" + std::to_string(arc.plane.code) + (arc.clockwise ? " G2" : " G3"),
+        centre(arc.plane.first_centre, arc.first) + centre(arc.plane.second_centre, arc.second)};
   }
 
   // Words that would print the same digits as before are left out, except when nothing else is
@@ -404,6 +435,7 @@ class Emitter {
   double length_scale_ = 1.0;
   bool has_poses_ = false;
   bool has_bends_ = false;
+  int plane_ = 17;
   bool inverse_time_ = false;
   Mode mode_ = Mode::unknown;
   std::uint64_t block_number_ = 0;
@@ -428,6 +460,7 @@ const Dialect kDialect = {"siemens_840d",
                           &read_back,
                           "the frame and the tool length that are active in the control are those "
                           "that the program names: it stops before its first motion otherwise",
+                          true,
                           true};
 
 }  // namespace smoothpost::siemens_840d

@@ -5,6 +5,7 @@
 
 #include "formats/siemens/mpf_reader.h"
 #include "kernels/core/units.h"
+#include "machines/dialects/arc_text.h"
 #include "machines/dialects/event_text.h"
 #include "machines/dialects/program_reading.h"
 #include "machines/dialects/siemens_840d.h"
@@ -307,8 +308,13 @@ class Reading {
     ReadBackMove move;
     move.rapid = block.has('G', 0.0);
     const bool bent = block.has("POLY");
-    if (!move.rapid && !bent && !block.has('G', 1.0))
-      return error(block, "an arc is not one of ours");
+    const bool arc = is_arc(block);
+    for (const auto& word : block.words) {
+      if (word.address != "G" || !word.value) continue;
+      const double g = *word.value;
+      if (g > 1.0 && !(arc && (g <= 3.0 || (g >= 17.0 && g <= 19.0))))
+        return error(block, "a motion with another G word is not one of ours");
+    }
     move.line = block.line;
     move.beam = beam_;
     move.to = JointVector::Zero(machine_.size());
@@ -321,9 +327,12 @@ class Reading {
       return error(block, "F in a block of G0");
     }
     if (bent && !may_bend(block)) return;
+    if (arc && transformation_) return error(block, "an arc under TRAORI is not one of ours");
     if (transformation_ ? read_pose(block, move) : read_joints(block, move))
       result.moves.push_back(std::move(move));
   }
+
+  static bool is_arc(const MpfBlock& block) { return block.has('G', 2.0) || block.has('G', 3.0); }
 
   // A polynomial begins where the axis stands, and the path has to follow its parameter: with SPATH
   // axes outside of FGROUP follow the length of the others' way.
@@ -347,10 +356,14 @@ class Reading {
     if (!suppressed && frame_ != Frame::zero)
       return error(block, "joint words with an offset: SUPA or G500 is missing"), false;
     int joints = 0;
+    const JointVector from = joints_;
+    const JointMask known_from = known_;
+    const bool arc = is_arc(block);
     if (block.has("POLY")) move.bend = JointBend::Zero(machine_.size(), 4);
     for (const auto& word : block.words) {
       static const std::set<std::string> kOthers = {"G", "F", "D", "SUPA", "POLY", "PL"};
       if (!word.polynomial && kOthers.count(word.address) > 0) continue;
+      if (arc && (word.address == "I" || word.address == "J" || word.address == "K")) continue;
       const int j = word.address.size() == 1 ? machine_.axis_by_letter(word.address[0]) : -1;
       if (j < 0 || !word.value)
         return error(block, "word " + word.address + " is no axis of the machine"), false;
@@ -365,7 +378,37 @@ class Reading {
     if (joints == 0) return error(block, "a motion without axis words"), false;
     move.to = joints_;
     move.known = known_;
-    return true;
+    return !arc || read_arc(block, from, known_from, move);
+  }
+
+  // A block that says all of its arc: plane, end, centre from the start (which is how G90 has it,
+  // too).
+  bool read_arc(const MpfBlock& block, const JointVector& from, JointMask known_from,
+                ReadBackMove& move) {
+    ArcBlock arc;
+    arc.clockwise = block.has('G', 2.0);
+    int planes = 0;
+    for (const int code : {17, 18, 19})
+      if (block.has('G', code)) {
+        arc.code = code;
+        ++planes;
+      }
+    if (planes != 1) return error(block, "an arc has to name its plane: G17, G18 or G19"), false;
+    if (block.has("SUPA")) return error(block, "an arc with SUPA is not one of ours"), false;
+    const std::string centres = arc.code == 17 ? "IJ" : arc.code == 18 ? "KI" : "JK";
+    for (const char letter : {'I', 'J', 'K'}) {
+      const MpfWord* word = block.find(std::string(1, letter));
+      const bool wanted = centres.find(letter) != std::string::npos;
+      if (wanted != (word != nullptr) || (word != nullptr && !word->value))
+        return error(block, "an arc in G" + std::to_string(arc.code) + " has its centre in " +
+                                centres[0] + " and " + centres[1] + " and nothing else"),
+               false;
+    }
+    arc.first = *block.find(centres.substr(0, 1))->value * scale_;
+    arc.second = *block.find(centres.substr(1))->value * scale_;
+    const std::string problem = set_arc(machine_, arc, from, known_from, move);
+    if (!problem.empty()) error(block, problem);
+    return problem.empty();
   }
 
   // The control's p runs from 0 to `length`, ours from 0 to 1.
