@@ -16,6 +16,12 @@ constexpr int kMostHalvings = 16;
 constexpr double kMostBendSteps = 4096.0;
 constexpr double kJump = 20.0 * kRadiansPerDegree;  // a rotary step that halving does not shorten
 
+bool is_tool_move(const ReadBackMove& m) { return m.interpolation == MoveInterpolation::tool; }
+
+bool goes_straight(const ReadBackMove& m) {
+  return !is_tool_move(m) && m.bend.rows() == 0 && m.arc.turn == 0;
+}
+
 class Follower {
  public:
   Follower(const ScrewChain& chain, const Inverse* inverse, const FollowSettings& settings)
@@ -39,7 +45,7 @@ class Follower {
         known |= move.known;
         for (int j = 0; j < chain_.size(); ++j)
           if (!(move.known >> j & 1U) && here_.size() > 0) move.to[j] = here_[j];
-        if (move.bend.rows() > 0)
+        if (!goes_straight(move))
           add_bend_steps(move);
         else
           out_.steps->moves.push_back(move);
@@ -68,7 +74,8 @@ class Follower {
   }
 
   void add_bend_steps(const ReadBackMove& move) {
-    const BentMove bent{here_, move.to, move.bend};
+    const BentMove bent{here_, move.to, move.bend, move.arc};
+    const double spread = arc_spread(bent);
     const BendBounds bounds = bend_bounds(bent);
     double share = 1.0;
     for (int j = 0; j < chain_.size(); ++j) {
@@ -80,9 +87,13 @@ class Follower {
     for (double k = 1.0; k <= steps; k += 1.0) {
       ReadBackMove step = move;
       step.bend.resize(0, 4);
+      step.arc = {};
       step.to = k == steps ? move.to : joints_at(bent, k / steps);
       step.duration = move.duration / steps;
       step.deviation = bounds.second / (8.0 * steps * steps);
+      step.spread = spread;
+      if (move.arc.turn != 0)
+        for (const int j : {move.arc.first, move.arc.second}) step.deviation[j] += spread;
       out_.steps->moves.push_back(std::move(step));
     }
   }
@@ -185,17 +196,9 @@ class Follower {
 
 }  // namespace
 
-namespace {
-
-bool is_tool_move(const ReadBackMove& m) { return m.interpolation == MoveInterpolation::tool; }
-
-bool is_straight(const ReadBackMove& m) { return !is_tool_move(m) && m.bend.rows() == 0; }
-
-}  // namespace
-
 Result<ControllerMotion> follow_controller(ReadBack read, const Inverse& inverse,
                                            const FollowSettings& settings) {
-  if (std::all_of(read.moves.begin(), read.moves.end(), is_straight))
+  if (std::all_of(read.moves.begin(), read.moves.end(), goes_straight))
     return Result<ControllerMotion>(ControllerMotion{std::move(read), {}});
   return Follower(inverse.chain(), &inverse, settings).run(std::move(read));
 }
@@ -204,7 +207,8 @@ ControllerMotion follow_joints(ReadBack read, const ScrewChain& chain,
                                const FollowSettings& settings) {
   require(std::none_of(read.moves.begin(), read.moves.end(), is_tool_move),
           "follow_joints: moves of joints");
-  if (std::all_of(read.moves.begin(), read.moves.end(), is_straight)) return {std::move(read), {}};
+  if (std::all_of(read.moves.begin(), read.moves.end(), goes_straight))
+    return {std::move(read), {}};
   return std::move(Follower(chain, nullptr, settings).run(std::move(read)).value());
 }
 

@@ -16,15 +16,15 @@ struct ControllerMotion {
   /// The program with the joints at the end of every move filled in.
   ReadBack read;
   /// The same with every tool move replaced by straight joint steps that leave the tool's own way
-  /// by at most the tolerances asked for, and every bent move by straight steps that say how far
-  /// the joints may be from them; nothing when no move is one of these.
+  /// by at most the tolerances asked for, and every bent move or arc by straight steps that say how
+  /// far the joints may be from them; nothing when no move is one of these.
   std::optional<ReadBack> steps;
   const ReadBack& joints() const { return steps ? *steps : read; }
 };
 
 struct FollowSettings {
   ToolTurn turn = ToolTurn::none;
-  /// mm, between joint steps and the tool's own way; on bent moves of a linear joint
+  /// mm, between joint steps and the tool's own way; on bent moves and arcs of a linear joint
   double tip_tolerance = 1e-4;
   double axis_tolerance = 1e-6;  ///< rad; on bent moves of a rotary joint
   /// mm, of the tool in use during move i.
@@ -37,9 +37,10 @@ struct FollowSettings {
 /// position; KN121 a pose out of reach on the way; KN122 the joints would have to jump (a singular
 /// posture).
 ///
-/// A bent move of K steps has |q_j(τ) − step| ≤ sup|q_j''| / (8K²) = ReadBackMove::deviation, with
-/// the supremum proven (bend_bounds) and K such that this is the tolerance at most (K ≤ 4096: else
-/// it is what it is).
+/// A bent move or an arc of K steps has |q_j(τ) − step| ≤ sup|q_j''| / (8K²) =
+/// ReadBackMove::deviation, with the supremum proven (bend_bounds) and K such that this is the
+/// tolerance at most (K ≤ 4096: else it is what it is). The two joints of an arc have its
+/// arc_spread() on top. An arc has to begin where its two joints are known.
 /// Guarantees (tests): steps of tool moves within the tolerances at their middles; dense samples of
 /// bent moves within the deviation; straight joint moves pass unchanged.
 /// Cost: linear in the steps.

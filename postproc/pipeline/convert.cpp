@@ -7,6 +7,7 @@
 
 #include "kernels/core/units.h"
 #include "kernels/optimise/shape_tuning.h"
+#include "postproc/pipeline/arc_blocks.h"
 #include "postproc/pipeline/arm_plan.h"
 #include "postproc/pipeline/beam_power.h"
 #include "postproc/pipeline/block_steps.h"
@@ -252,10 +253,7 @@ class Converter {
     plan_blending(program_, in_.machine, chain_);
     if (follows_power(in_.machine))
       power_ = follow_power(program_, reference_, out_.schedule, in_.machine);
-    if (in_.machine.dialect.curves != "lines") {
-      join_into_curves(program_, {reference_, out_.schedule, in_.machine, chain_});
-      out_.assumes.push_back(curve_assumption(in_.machine));
-    }
+    make_curves();
     if (!built.cramped.empty()) {
       out_.diagnostics.push_back(diagnostic(
           "LK104",
@@ -276,6 +274,15 @@ class Converter {
     if (in_.timed)
       out_.timeline = timeline_of({program_, out_.schedule, in_.machine, chain_, *inverse_, turn_});
     return true;
+  }
+
+  void make_curves() {
+    const std::string& curves = in_.machine.dialect.curves;
+    const CurveInput with{reference_, out_.schedule, in_.machine, chain_};
+    if (curves == "lines") return;
+    const bool arcs = curves == "arcs";
+    arcs ? join_into_arcs(program_, with) : join_into_curves(program_, with);
+    out_.assumes.push_back(arcs ? arc_assumption() : curve_assumption(in_.machine));
   }
 
   // What the input itself asks of the joints, for the report.

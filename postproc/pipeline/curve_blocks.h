@@ -1,26 +1,11 @@
 #pragma once
 
-#include <cstddef>
 #include <string>
 
-#include "machines/dialects/dialect.h"
-#include "postproc/pipeline/feed_schedule.h"
-#include "postproc/pipeline/reference_path.h"
+#include "postproc/pipeline/block_runs.h"
 
 // Few blocks along polynomials in the place of many straight ones.
 namespace smoothpost {
-
-struct CurveInput {
-  const ReferencePath& reference;
-  const FeedSchedule& schedule;
-  const MachineDefinition& machine;
-  const ScrewChain& chain;  ///< tool length 0, part placed
-};
-
-struct CurveReport {
-  std::size_t before = 0, after = 0;  ///< moves of scheduled stretches
-  std::size_t curves = 0;             ///< of those behind, the bent ones
-};
 
 /// Replaces runs of straight moves of one scheduled stretch by bent moves: the longest that hold,
 /// from the front. The polynomial of a run from s0 to s1 is hermite_bend() of the stretch's joints,

@@ -1,8 +1,11 @@
 #include "postproc/pipeline/recipe_check.h"
 
+#include <cmath>
 #include <string>
 
+#include "kernels/core/units.h"
 #include "kernels/kinematics/inverse.h"
+#include "machines/dialects/arc_text.h"
 #include "machines/dialects/decimal.h"
 
 namespace smoothpost {
@@ -33,6 +36,34 @@ std::string text_of(double value) {
   return text;
 }
 
+/// The radii of an arc at its ends differ by the rounding of start, end and centre.
+bool prints_arcs(const DialectSettings& dialect) {
+  const double unit = std::pow(10.0, -dialect.digits_length) *
+                      (dialect.units == "inch" ? kMillimetresPerInch : 1.0);
+  return std::sqrt(8.0) * unit <= kRadiusAgreement;
+}
+
+void check_curves(const MachineDefinition& machine, const Dialect& dialect, Refusals& refusals) {
+  const DialectSettings& settings = machine.dialect;
+  const auto refuse = [&](const char* possible) {
+    refusals.refuse("dialect.curves", settings.curves, possible);
+  };
+  const bool arcs = settings.curves == "arcs";
+  if (settings.curves == "lines") return;
+  if (arcs ? !dialect.arcs : !dialect.polynomials)
+    refuse(arcs ? "lines (this dialect prints no arcs)"
+                : "lines (this dialect prints no polynomials)");
+  if (settings.mode == "tcp")
+    refuse(arcs ? "lines (arcs are of joints: dialect.mode = \"joint\" has them)"
+                : "lines (polynomials are of joints: dialect.mode = \"joint\" has them)");
+  if (machine.recipe.task == "pose")
+    refuse("lines (the rotation about the tool is proven for straight joints only)");
+  if (arcs && !prints_arcs(settings))
+    refuse(
+        "lines (with so few dialect.digits_length the radii at both ends of an arc would not "
+        "agree within 0.005 mm: 3 digits of mm or 5 of inch do)");
+}
+
 void check_dialect(const MachineDefinition& machine, const Dialect& dialect, Refusals& refusals) {
   const DialectSettings& settings = machine.dialect;
   const ToolTurn turn = tool_turn_of(machine, dialect);
@@ -45,15 +76,7 @@ void check_dialect(const MachineDefinition& machine, const Dialect& dialect, Ref
   if (settings.path_mode != "exact" && turn != ToolTurn::slerp)
     refusals.refuse("dialect.path_mode", settings.path_mode,
                     "exact (the rounding of this control has no bound that is known)");
-  if (settings.curves != "lines" && !dialect.polynomials)
-    refusals.refuse("dialect.curves", settings.curves,
-                    "lines (this dialect prints no polynomials)");
-  if (settings.curves != "lines" && settings.mode == "tcp")
-    refusals.refuse("dialect.curves", settings.curves,
-                    "lines (polynomials are of joints: dialect.mode = \"joint\" has them)");
-  if (settings.curves != "lines" && machine.recipe.task == "pose")
-    refusals.refuse("dialect.curves", settings.curves,
-                    "lines (the rotation about the tool is proven for straight joints only)");
+  check_curves(machine, dialect, refusals);
 }
 
 void check_smoothing(const MachineDefinition& machine, const ToolPath& input, Refusals& refusals) {

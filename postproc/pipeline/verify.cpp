@@ -82,13 +82,14 @@ void check_axes(const ReadBack& read, const MachineDefinition& machine,
         const double q = move.to[j];
         // A step of a bent move: h²/8·|q''| off the straight way is 4/h times that in q'.
         const double off = move.deviation.size() > 0 ? move.deviation[j] : 0.0;
+        const double bent = std::max(0.0, off - move.spread);
         share.see((std::abs(q - mid) + off) / half, move.line, times[i]);
         const double low = (q - off) * scale, high = (q + off) * scale;
         summary.position_low = first ? low : std::min(summary.position_low, low);
         summary.position_high = first ? high : std::max(summary.position_high, high);
         first = false;
         if (!move.rapid && move.duration > 0.0 && from.size() > 0)
-          speed.see((std::abs(q - from[j]) + 4.0 * off) / move.duration * scale, move.line,
+          speed.see((std::abs(q - from[j]) + 4.0 * bent) / move.duration * scale, move.line,
                     times[i]);
       }
       from = move.to;
@@ -337,7 +338,9 @@ class DeviationCheck {
     const bool by_tool = move.interpolation == MoveInterpolation::tool;
     const Pose start = by_tool ? start_pose(i, tool_length) : Pose::Identity();
     const JointVector& from = read_.moves[i - 1].to;
-    const BentMove joints{from, move.to, move.bend};
+    const BentMove joints{from, move.to, move.bend, move.arc};
+    // In the part: two unit directions, each by as much.
+    const double spread = by_tool ? 0.0 : std::sqrt(2.0) * arc_spread(joints);
     auto own = by_tool ? tool_motion_bound(start, move.tool, in_.turn, in_.chain.tool_axis)
                        : joint_motion_bound(joints);
     if (!by_tool) own.tip += tool_length * own.axis;
@@ -348,7 +351,7 @@ class DeviationCheck {
       const auto input = in_.reference.second_derivative_bound(piece.segment);
       const double tip_bend = part * part * own.tip + span * span * input.tip;
       const double axis_bend = part * part * own.axis + span * span * input.axis;
-      const double most = joints.bend.rows() > 0 ? kMostBentSteps : kMostSteps;
+      const double most = joints.is_straight() ? kMostSteps : kMostBentSteps;
       const int steps = std::max(steps_for(tip_bend, axis_bend, most), orientation_steps(piece));
       if (orientation_) orientation_->begin();
       const double h2 = 1.0 / (8.0 * steps * steps);
@@ -358,13 +361,14 @@ class DeviationCheck {
         const Pose pose = by_tool ? tool_motion(start, move.tool, t, in_.turn, in_.chain.tool_axis)
                                   : tip_pose(in_.chain, joints_at(joints, t), tool_length);
         const double s = piece.from + share * span;
-        compare_pose_at(i, pose, {piece.segment, s}, {h2 * tip_bend, h2 * axis_bend + allowance});
+        compare_pose_at(i, pose, {piece.segment, s},
+                        {h2 * tip_bend + spread, h2 * axis_bend + allowance});
       }
     }
   }
 
   SecondDerivativeBound joint_motion_bound(const BentMove& joints) const {
-    if (joints.bend.rows() == 0) return second_derivative_bound(in_.chain, joints.from, joints.to);
+    if (joints.is_straight()) return second_derivative_bound(in_.chain, joints.from, joints.to);
     const BendBounds bounds = bend_bounds(joints);
     return bent_motion_bound(
         in_.chain, {joints_at(joints, 0.5), rates_at(joints, 0.5), bounds.rate, bounds.second});
@@ -492,12 +496,19 @@ class DeviationCheck {
   void compare_joints(std::size_t i) {
     const MachineMove& planned = in_.planned.moves[i];
     if (planned.interpolation == MoveInterpolation::tool) compare_pose(i, planned);
+    const JointArc &arc = planned.arc, &got = read_.moves[i].arc;
+    if (arc.turn != got.turn || arc.first != got.first || arc.second != got.second)
+      return broken(read_.moves[i].line, "an arc is in another plane or sense than planned");
     for (int j = 0; j < machine_.size(); ++j) {
       if (!(planned.joints >> j & 1U)) continue;
       double off = std::abs(planned.to[j] - read_.moves[i].to[j]);
       for (Eigen::Index k = 0; k < 4; ++k)
         off = std::max(off,
                        std::abs(bend_of(planned.bend, j, k) - bend_of(read_.moves[i].bend, j, k)));
+      if (arc.turn != 0 && j == arc.first)
+        off = std::max(off, std::abs(arc.centre_first - got.centre_first));
+      if (arc.turn != 0 && j == arc.second)
+        off = std::max(off, std::abs(arc.centre_second - got.centre_second));
       joints_[static_cast<std::size_t>(j)].see(
           off * display_scale(machine_.axes[static_cast<std::size_t>(j)]), read_.moves[i].line,
           times_[i], planned.input_line);

@@ -12,6 +12,7 @@ namespace smoothpost::test {
 struct DialectCase {
   std::string machine;
   std::string dialect;
+  std::string curves = {};  ///< empty: the machine file's
 };
 
 inline const std::vector<std::string>& all_machines() {
@@ -40,7 +41,7 @@ inline std::vector<DialectCase> suited_cases() {
   std::vector<DialectCase> cases;
   for (const auto& machine : all_machines())
     for (const auto& dialect : dialects())
-      if (is_suited(machine, dialect.name)) cases.push_back({machine, dialect.name});
+      if (is_suited(machine, dialect.name)) cases.push_back({machine, dialect.name, {}});
   return cases;
 }
 
