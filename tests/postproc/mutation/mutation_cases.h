@@ -34,6 +34,13 @@ inline const char* const kLaserProgram =
     "G1 Y3 B2 C3\nG3 X2 Y5 I-2 J0\nG1 X0 Y3 B0 C0\nM63 P0\nG0 Z20\nG0 X10\nG0 Z1\nM62 P0\n"
     "G1 X13 Y2 F3000\nM63 P0\nM65 P1\nG0 Z50\nM429\nM30\n%\n";
 
+/// Two cuts along arcs and helices in all three planes, coolant that comes on inside the first.
+inline const char* const kArcProgram =
+    "%\nM428\nG21 G17 G90 G94 G40\nT1 M6\nG54\nS1000 M3\nG0 X-6 Y0 A0 C0\nG43 H1 Z30\nG0 Z2\n"
+    "G1 Z0 F600\nG3 X6 Y0 Z-1 I6 J0 F900\nG3 X-6 Y0 I-6 J0\nM8\nG2 X0 Y-6 I6 J0\n"
+    "G18 G3 X-4 Z3 I-4 K0\nG17\nM9\nG0 Z30\nG0 X8 Y8\nG0 Z2\nG1 Z1 F600\n"
+    "G19 G3 Y12 Z5 J0 K4\nG17\nG0 Z30\nM5\nM429\nM30\n%\n";
+
 inline std::vector<std::string> event_lines(const MachineDefinition& machine) {
   std::vector<std::string> words;
   for (const auto& row : machine.process.events) {
@@ -48,16 +55,21 @@ inline std::vector<std::string> event_lines(const MachineDefinition& machine) {
 inline MutationCase make_case(const DialectCase& c, std::string program = {},
                               std::vector<MachineOverride> overrides = {}) {
   MutationCase out;
-  out.name = c.dialect + " on " + c.machine;
+  out.name = c.dialect + " on " + c.machine + (c.curves.empty() ? "" : " with " + c.curves);
   out.beam = is_laser(c.machine);
   ConvertInput in;
-  if (program.empty()) program = out.beam ? kLaserProgram : kMillProgram;
+  if (program.empty())
+    program = c.curves == "arcs" ? kArcProgram : out.beam ? kLaserProgram : kMillProgram;
   in.input = read_program(program, out.beam ? "laser_5p1" : "table_table_ac");
   overrides.insert(overrides.begin(), {{"dialect.name", c.dialect},
                                        {"recipe.smoothing", "none"},
                                        {"tolerance.tip_mm", "0.05"},
                                        {"tolerance.axis_deg", "0.25"},
                                        {"tolerance.limit_share", "0.85"}});
+  if (!c.curves.empty()) {
+    overrides.push_back({"dialect.mode", "joint"});
+    overrides.push_back({"dialect.curves", c.curves});
+  }
   if (c.dialect == "ros1_trajectory")
     for (const char* event : {"beam_on", "beam_off", "gas_on", "gas_off"})
       overrides.push_back({std::string("process.events.") + event,
@@ -120,7 +132,11 @@ inline const std::vector<DialectCase>& mutation_cases() {
                                                  {"robot_6r", "val3"},
                                                  {"robot_6r", "yaskawa_jbi"},
                                                  {"laser_5p1", "ros1_trajectory"},
-                                                 {"laser_5p1", "ros_trajectory"}};
+                                                 {"laser_5p1", "ros_trajectory"},
+                                                 {"table_table_bc", "linuxcnc", "arcs"},
+                                                 {"table_table_bc", "siemens_840d", "arcs"},
+                                                 {"table_table_bc", "fanuc_30i", "arcs"},
+                                                 {"table_table_bc", "beckhoff", "arcs"}};
   return cases;
 }
 

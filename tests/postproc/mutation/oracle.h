@@ -181,9 +181,27 @@ class Tracer {
       for (int j = 0; j < chain_.size(); ++j)
         if (!(move.known >> j & 1U)) to[j] = q_[j];
     if (!link && known && q_.size() > 0)
-      add_samples([&](double t) { return with_tool(chain_, q_ + t * (to - q_), m_.tool_length); });
+      add_samples(
+          [&](double t) { return with_tool(chain_, joints_on(move, to, t), m_.tool_length); });
     q_ = to;
     if (known) here_ = with_tool(chain_, q_, m_.tool_length);
+  }
+
+  // On the straight way, or round the centre of an arc at the start's distance from it.
+  JointVector joints_on(const ReadBackMove& move, const JointVector& to, double t) const {
+    JointVector q = q_ + t * (to - q_);
+    const JointArc& arc = move.arc;
+    if (arc.turn == 0) return q;
+    const Eigen::Vector2d centre(arc.centre_first, arc.centre_second);
+    const Eigen::Vector2d a = Eigen::Vector2d(q_[arc.first], q_[arc.second]) - centre;
+    const Eigen::Vector2d b = Eigen::Vector2d(to[arc.first], to[arc.second]) - centre;
+    double turn = std::atan2(b.y(), b.x()) - std::atan2(a.y(), a.x());
+    while (arc.turn * turn <= 0.0) turn += arc.turn * 2.0 * std::acos(-1.0);
+    while (std::abs(turn) > 2.0 * std::acos(-1.0)) turn -= arc.turn * 2.0 * std::acos(-1.0);
+    const Eigen::Vector2d now = centre + Eigen::Rotation2Dd(t * turn) * a;
+    q[arc.first] = now.x();
+    q[arc.second] = now.y();
+    return q;
   }
 
   // The pose of the real tool in the real part, when the text's frames are others.

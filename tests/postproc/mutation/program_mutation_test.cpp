@@ -37,6 +37,11 @@ bool same(const std::optional<Pose>& a, const std::optional<Pose>& b) {
   return a.has_value() == b.has_value() && (!a || a->matrix() == b->matrix());
 }
 
+bool same(const JointArc& a, const JointArc& b) {
+  return a.turn == b.turn && a.first == b.first && a.second == b.second &&
+         a.centre_first == b.centre_first && a.centre_second == b.centre_second;
+}
+
 /// Everything that a reader found, but for lines.
 bool same_reading(const ReadBack& a, const ReadBack& b) {
   if (a.moves.size() != b.moves.size() || a.events.size() != b.events.size()) return false;
@@ -44,7 +49,8 @@ bool same_reading(const ReadBack& a, const ReadBack& b) {
     const ReadBackMove &m = a.moves[i], &n = b.moves[i];
     if (m.to != n.to || m.known != n.known || m.interpolation != n.interpolation ||
         m.tool.matrix() != n.tool.matrix() || m.rapid != n.rapid || m.beam != n.beam ||
-        m.blend != n.blend || m.spline != n.spline || m.duration != n.duration)
+        m.blend != n.blend || m.spline != n.spline || m.duration != n.duration ||
+        m.bend.rows() != n.bend.rows() || m.bend != n.bend || !same(m.arc, n.arc))
       return false;
   }
   for (std::size_t i = 0; i < a.events.size(); ++i) {
