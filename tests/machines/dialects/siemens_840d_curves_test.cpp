@@ -90,10 +90,12 @@ TEST_CASE("siemens_840d: polynomials that could move differently are refused",
   const std::string start = "G500 D0\nG0 X10 Y0 Z0 B0 C0\nG93\n", upath = kHead + "UPATH\n";
   const std::string poly = "POLY PO[X]=(0,-2.5) PL=1 F60\n", end = "G94\nM30\n";
   REQUIRE(siemens_840d::read_back(machine, upath + start + poly + end, "p").ok());
+  REQUIRE(siemens_840d::read_back(machine, upath + start + "G1 X5 F60\n" + end, "p").ok());
   const std::string bad[] = {
-      kHead + start + poly + end,                              // no UPATH
-      kHead + "SPATH\n" + start + poly + end,                  // along the length
-      upath + start + "SPATH\n" + poly + end,                  // back to it
+      upath + start + "G1 G91 X5 F60\n" + end,  // a G word that a motion has nothing to do with
+      kHead + start + poly + end,               // no UPATH
+      kHead + "SPATH\n" + start + poly + end,   // along the length
+      upath + start + "SPATH\n" + poly + end,   // back to it
       upath + start + "POLYPATH(\"VECT\")\n" + poly + end,     // axes straight
       upath + start + "FGROUP(X,Y)\n" + poly + end,            // another length
       upath + start + "G94\n" + poly + end,                    // F is no time
