@@ -9,8 +9,8 @@
 #include "formats/nc/dialect_detection.h"
 #include "formats/nc/program_stream.h"
 #include "kernels/core/units.h"
+#include "postproc/pipeline/canonical_record.h"
 #include "postproc/pipeline/hash.h"
-#include "postproc/pipeline/motion_record.h"
 
 namespace smoothpost {
 
@@ -30,7 +30,7 @@ std::string words_text(AxisMask mask) {
 /// Turns recorded calls into path points and events.
 class PathBuilder {
  public:
-  PathBuilder(MotionRecord& recorder, const InputSettings& settings)
+  PathBuilder(CanonicalRecord& recorder, const InputSettings& settings)
       : recorder_(recorder), settings_(settings) {}
 
   Result<InterpretedInput> run() {
@@ -83,13 +83,13 @@ class PathBuilder {
       add_motions(step.motions_before);
       if (has_error(diagnostics_)) return;
       switch (step.kind) {
-        case MotionRecord::Step::Kind::tool:
+        case CanonicalRecord::Step::Kind::tool:
           set_tool(recorder_.states[step.index]);
           break;
-        case MotionRecord::Step::Kind::offset:
+        case CanonicalRecord::Step::Kind::offset:
           set_offset(recorder_.states[step.index]);
           break;
-        case MotionRecord::Step::Kind::event:
+        case CanonicalRecord::Step::Kind::event:
           add_event(recorder_.events[step.index]);
           break;
       }
@@ -113,7 +113,7 @@ class PathBuilder {
     }
   }
 
-  void set_tool(const MotionRecord::State& state) {
+  void set_tool(const CanonicalRecord::State& state) {
     compensation_ = state.length;
     if (state.tool > 0) tool_in_use(state.tool);
     // G43.1 states a length itself, with or without a tool number.
@@ -128,7 +128,7 @@ class PathBuilder {
     tool_length_ = known == settings_.tool_lengths.end() ? 0.0 : known->second;
   }
 
-  void set_offset(const MotionRecord::State& state) {
+  void set_offset(const CanonicalRecord::State& state) {
     if (!world_set_) {
       out_.frames.world_from_part = Pose::Identity();
       out_.frames.world_from_part.linear() = rotation_about(Vec3::UnitZ(), state.rotation);
@@ -169,7 +169,7 @@ class PathBuilder {
   }
 
   void add_motion(std::size_t index) {
-    const MotionRecord::Motion& motion = recorder_.motions[index];
+    const CanonicalRecord::Motion& motion = recorder_.motions[index];
     // With the tool axis as a vector the rotary bits say whether that is unknown.
     const AxisMask counts =
         motion.axis_vector ? static_cast<AxisMask>(programmed_ | kRotary) : programmed_;
@@ -205,7 +205,7 @@ class PathBuilder {
     push(std::move(point));
   }
 
-  PathPoint make_point(const MotionRecord::Motion& motion) {
+  PathPoint make_point(const CanonicalRecord::Motion& motion) {
     PathPoint point;
     point.kind = motion.kind;
     point.interpolation =
@@ -251,7 +251,8 @@ class PathBuilder {
   }
 
   // A program whose first motion starts at a known place (an earlier lost motion ended there).
-  void add_start_point(const MotionRecord::Start& from, const PathPoint& like, bool axis_vector) {
+  void add_start_point(const CanonicalRecord::Start& from, const PathPoint& like,
+                       bool axis_vector) {
     PathPoint start = like;
     start.words = from.words;
     if (axis_vector) {
@@ -376,7 +377,7 @@ class PathBuilder {
     diagnostics_.push_back(std::move(d));
   }
 
-  MotionRecord& recorder_;
+  CanonicalRecord& recorder_;
   const InputSettings& settings_;
   InterpretedInput out_;
   std::optional<ReferencePath> reference_;
@@ -500,7 +501,7 @@ Result<InterpretedInput> interpret_nc(std::string text, const InputSettings& set
   }
   const auto dialect = dialect_of(text, settings);
   if (!dialect.ok()) return Result<InterpretedInput>::failure(dialect.diagnostics());
-  MotionRecord recorder;
+  CanonicalRecord recorder;
   nc::ProgramStream::Hooks hooks;
   hooks.restart = [&] { recorder = {}; };
   std::optional<nc::ProgramStream> program;
@@ -529,7 +530,7 @@ namespace {
 
 /// The path of what a reader with a summary of its own called.
 template <typename Summary>
-Result<InterpretedInput> built_path(MotionRecord& recorder, const InputSettings& settings,
+Result<InterpretedInput> built_path(CanonicalRecord& recorder, const InputSettings& settings,
                                     const Summary& summary, Diagnostics diagnostics,
                                     const char* dialect) {
   auto built = PathBuilder(recorder, settings).run();
@@ -546,7 +547,7 @@ Result<InterpretedInput> built_path(MotionRecord& recorder, const InputSettings&
 Result<InterpretedInput> interpret_heidenhain(std::string text, const InputSettings& settings) {
   nc::InterpreterSettings reader = interpreter_settings(settings);
   reader.inch_default = false;  // the text says its unit
-  MotionRecord recorder;
+  CanonicalRecord recorder;
   const auto summary = conversational::read(text, settings.file_name, reader, recorder);
   if (!summary.ok()) return Result<InterpretedInput>::failure(summary.diagnostics());
   return built_path(recorder, settings, summary.value(), summary.diagnostics(), "heidenhain");
@@ -556,7 +557,7 @@ Result<InterpretedInput> interpret_cl(std::string text, const InputSettings& set
   cl::ReaderSettings reader = settings.cl;
   if (settings.machine) reader.process = settings.machine->process;
   if (settings.process) reader.process = *settings.process;
-  MotionRecord recorder;
+  CanonicalRecord recorder;
   const auto summary = cl::read(text, settings.file_name, reader, recorder);
   if (!summary.ok()) return Result<InterpretedInput>::failure(summary.diagnostics());
   return built_path(recorder, settings, summary.value(), summary.diagnostics(), "");

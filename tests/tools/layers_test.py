@@ -42,6 +42,11 @@ UNIT_NAME = re.compile(
 UNIT_EXEMPT_FILES = {"kernels/core/units.h"}
 UNIT_EXEMPT_NAMES = {"kernels/core/check.h": {"time_s"}}
 
+# A namespace that opens, its end, or a type that is defined, each at the start of a line.
+TYPE_OR_SPACE = re.compile(
+    r"^(?:namespace (?P<space>[\w:]+) \{|(?:struct|class|enum class|enum) (?P<type>\w+)[^;{]*\{|\}  // namespace)",
+    re.MULTILINE)
+
 # Below postproc/cli nothing prints, ends the process, asks the locale or reads a clock of the day.
 FORBIDDEN_HEADERS = {
     "iostream": "prints", "cassert": "aborts (use require())", "clocale": "is global state",
@@ -146,6 +151,7 @@ class Tree:
         self.rows, self.problems = read_table(self.root / "tests/tools/layers.txt")
         self.cgal_units = []
         self.used = set()
+        self.types = {}  # with its namespace: the header that defines it
 
     def say(self, path, text, position, message):
         line = text.count("\n", 0, position) + 1
@@ -176,11 +182,27 @@ class Tree:
         if file.suffix in HEADER_SUFFIXES and component != PUBLIC_INCLUDE:
             if not re.search(r"^#pragma once$", text, re.MULTILINE):
                 self.problems.append(f"{path}:1: a header without #pragma once")
+            self.check_types(path, text)
         self.check_includes(path, component, text, code)
         if component not in PRINTING_COMPONENTS:
             self.check_calls(path, code)
         if path.startswith("kernels/"):
             self.check_names(path, code)
+
+    def check_types(self, path, text):
+        """Two types of one name in one namespace: the linker takes either for both, without a word."""
+        spaces = []
+        for match in TYPE_OR_SPACE.finditer(text):
+            if match.group("space") is not None:
+                spaces.append(match.group("space"))
+            elif match.group("type") is None:
+                if spaces:
+                    spaces.pop()
+            else:
+                name = "::".join(spaces + [match.group("type")])
+                other = self.types.setdefault(name, path)
+                if other != path:
+                    self.say(path, text, match.start(), f"{name} is defined in {other}, too")
 
     def check_includes(self, path, component, text, code):
         includes_cgal = False
@@ -258,6 +280,8 @@ postproc/cli     | postproc/capi/include      | -      | CLI/
                            "double turn_min(double angle_s);\n",
     "kernels/core/units.h": "#pragma once\nconstexpr double kA = 1; double radians(double degrees);\n",
     "kernels/core/check.h": "#pragma once\nstruct Check { double time_s = 0.0; };\n",
+    "kernels/core/box.h": "#pragma once\nnamespace smoothpost {\nclass Tree;\ndouble f() {\n  return 1.0;\n}\nstruct Tree {\n"
+                          "  struct Node {};\n};\nnamespace other {\nstruct Tree {};\n}  // namespace\n}  // namespace\n",
     "kernels/geometry/tree.h": "#pragma once\n#include \"kernels/core/pose.h\"\n",
     "kernels/geometry/tree.cpp": "#include \"kernels/geometry/tree.h\"\n#include <CGAL/AABB_tree.h>\n"
                                  "const char* a = \"feed_deg\"; // abort(\n",
@@ -315,6 +339,9 @@ VIOLATIONS = [
      "its folder has no row in layers.txt"),
     ("source one level too deep", "kernels/core/deep/a.h", "#pragma once\n", "its folder has no row"),
     ("source directly on a floor", "kernels/a.h", "#pragma once\n", "its folder has no row"),
+    ("two types of one name", "kernels/core/limits.h",
+     "#pragma once\nnamespace smoothpost {\nstruct Tree {\n  int a;\n};\n}  // namespace\n",
+     "smoothpost::Tree is defined in kernels/core/box.h, too"),
     ("table row without a source", "tests/tools/layers.txt",
      GOOD_TREE["tests/tools/layers.txt"] + "formats/csv | - | - | -\n", "formats/csv has a row but no source"),
     ("table that points up", "tests/tools/layers.txt",

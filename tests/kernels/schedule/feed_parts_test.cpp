@@ -75,6 +75,46 @@ TEST_CASE("feed_parts: parts that never meet are solved as one", "[kernels][sche
   CHECK(parts.solution.time == Approx(2.0 * std::sqrt(1e6 / 1e3)).epsilon(2e-3));
 }
 
+TEST_CASE("feed_parts: feeds that differ by powers of ten do not join parts",
+          "[kernels][schedule]") {
+  // A line on which a rotary turns by 120 rad within some 10 mm, now and then: there the feed is
+  // 0.05 mm/s, and 250 mm/s elsewhere.
+  FeedPath path = test::line(2400.0, 250.0);
+  path.jet = [](std::size_t, double s) {
+    PathJet jet{test::joints({1.0, 0.0}), test::joints({0.0, 0.0}), test::joints({0.0, 0.0})};
+    jet.tip_first = 1.0;
+    for (const double middle : {280.0, 320.0, 930.0, 1410.0, 1990.0}) {
+      // q' = 20 / cosh²(x), x = (s − middle) / 3
+      const double x = (s - middle) / 3.0, t = std::tanh(x), f = 20.0 * (1.0 - t * t);
+      jet.first[1] += f;
+      jet.second[1] += -2.0 * t * f / 3.0;
+      jet.third[1] += (6.0 * t * t - 2.0) * f / 9.0;
+    }
+    return jet;
+  };
+  FeedLimits limits = test::no_limits(2);
+  limits.velocity = test::joints({300.0, 1.0});
+  limits.acceleration = test::joints({1e3, 10.0});
+  limits.jerk = test::joints({1e4, 100.0});
+  const FeedStretch stretch{&path, FeedLanes::from(limits), 0.0, 2400.0,
+                            RestMap(2400.0, {250.0, 1e3, 1e4}, {})};
+  const double w = stretch.map.extent();
+  const FeedGrid grid =
+      feed_grid(stretch, feed_elements(stretch, {{0.0, w}, {0.0, w}}, 2400), 5, false);
+  FeedProgram program;
+  program.grid = &grid;
+  program.lanes = &stretch.lanes;
+  program.factors.resize(grid.points());
+  const FeedParts parts = solve_in_parts(program, {{1e-6, 400}});
+  CHECK(parts.parts.size() == 4);
+  REQUIRE(parts.solution.converged);
+  const FeedSolution whole = solve_feed(program, local_law(program), {1e-6, 1000});
+  REQUIRE(whole.converged);
+  CHECK(parts.solution.time == Approx(whole.time).epsilon(1e-3));
+  const auto r = point_ratios(program, parts.solution.controls);
+  CHECK(std::max({r.velocity, r.acceleration, r.jerk}) < 1.005);
+}
+
 TEST_CASE("mend_law: rows that are drawn in are kept, what is far from them stays",
           "[kernels][schedule]") {
   constexpr std::size_t kFirst = 700, kCount = 10, kReach = 24;

@@ -14,7 +14,7 @@ namespace smoothpost {
 
 /// Keeps what an interpreter calls: 128 bytes a motion, as a motion mostly starts where the one
 /// before ends.
-class MotionRecord final : public CanonicalSink {
+class CanonicalRecord final : public CanonicalSink {
  public:
   /// A CanonicalMotion without its start.
   struct Motion {
