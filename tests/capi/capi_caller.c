@@ -159,7 +159,8 @@ static void check_contract(const char* source) {
   count.cancel_at = 0;
   expect(smoothpost_run(&options, &result) == SMOOTHPOST_CERTIFIED, "not cancelled");
   smoothpost_result_destroy(result);
-  for (count.cancel_at = count.calls; count.cancel_at > 0; count.cancel_at /= 2) {
+  /* How often a run asks depends on which thread solves what: not the last calls. */
+  for (count.cancel_at = count.calls / 2; count.cancel_at > 0; count.cancel_at /= 2) {
     size_t size = 1;
     count.calls = 0;
     expect(smoothpost_run(&options, &result) == SMOOTHPOST_USAGE, "cancelled by force");

@@ -74,8 +74,8 @@ def main():
             tip = next(c for c in told["checks"] if c["name"] == "tip_deviation")
             print(f"{machine}: {told['verdict']}, {told['output']['blocks']} blocks, tip {tip['value']:.4f} of {tip['limit']} mm",
                   flush=True)
-            assert told["verdict"] == "certified" and tip["worst"] <= tip["limit"]
-            assert told["output"]["blocks"] > 0.9 * (options.points or len(every)) and math.isfinite(tip["worst"])
+            assert told["verdict"] == "certified" and tip["value"] <= tip["limit"]
+            assert told["output"]["blocks"] > 0.9 * (options.points or len(every)) and math.isfinite(tip["value"])
 
 
 if __name__ == "__main__":
