@@ -460,7 +460,7 @@ TEST_CASE("machine file: values that are not in the list", "[machines][definitio
   refused("dialect", "mode", "joint or tcp");
   refused("dialect", "units", "mm or inch");
   refused("dialect", "path_mode", "exact, blend or spline");
-  refused("dialect", "curves", "lines, cubic or quintic");
+  refused("dialect", "curves", "lines, arcs, cubic or quintic");
   refused("process", "unmapped", "refuse or comment");
   check_value(base_and("[dialect]\nextension = \".ngc\"\n"), "MF113", "extension = \".ngc\"");
   check_value(base_and("[dialect]\nname = \"\"\n"), "MF113", "name = \"\"");
