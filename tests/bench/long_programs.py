@@ -41,8 +41,8 @@ def raster(lines):
 def convert(tool, program, folder):
     """Seconds of processor time, bytes of memory and the report of one conversion."""
     report = folder / "report.json"
-    command = [tool, "convert", program, "--input-machine", "table_table_ac", "-m", "table_table_bc", "-o",
-               folder / "out.ngc", "--json", report]
+    command = [tool, "convert", program, "--input-machine", "table_table_ac", "-m", "table_table_bc",
+               "--work-offset", "G54=0,0,40", "-o", folder / "out.ngc", "--json", report]
     child = subprocess.Popen([str(word) for word in command], stderr=subprocess.PIPE)
     _, text = child.communicate()
     usage = resource.getrusage(resource.RUSAGE_CHILDREN)
