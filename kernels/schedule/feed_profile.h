@@ -126,7 +126,7 @@ struct FeedResult {
 /// element) of one window at most, 1 kB a point of the parts that are being solved, and 100 bytes
 /// an element of the law. Cost: about 7 calls of path.jet an element and 4 a piece, more where jets
 /// cannot be interpolated between them to 1e-6; 0.2 to 0.4 µs a collocation point and iteration, 20
-/// to 60 iterations a solve, two to five solves.
+/// to 180 iterations a solve, two to five solves.
 /// @pre breaks ascend, feed (and rate, unless empty) fit the pieces, jets have as many joints as
 /// the limits, at most 12; given speeds > 0; settings > 0   @throws ContractViolation Not from a
 /// paper: the papers run at constant feed. Derived in the rows of docs/equations.md.
