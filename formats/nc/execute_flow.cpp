@@ -3,7 +3,6 @@
 
 #include "formats/nc/executor.h"
 #include "formats/nc/number_text.h"
-#include "kernels/core/contract.h"
 
 // Lines of program flow: loops, branches, jumps. Calls are in execute_calls.cpp.
 namespace smoothpost::nc {
@@ -11,8 +10,10 @@ namespace smoothpost::nc {
 using Kind = FlowKind;
 
 FlowIndex& Executor::index_of(ProgramUnit& unit) {
-  require(unit.program->is_whole(), "the flow of a whole program");
-  if (!unit.index) unit.index = index_flow(*unit.program);
+  if (!unit.index) {
+    const bool in_windows = stream_ != nullptr && unit.program == &stream_->program();
+    unit.index = in_windows ? stream_->take_flow() : index_flow(*unit.program);
+  }
   return *unit.index;
 }
 
@@ -26,10 +27,11 @@ void Executor::tell_flow_faults(ProgramUnit& unit) {
 }
 
 TextPlace Executor::flow_place(const FlowStatement& statement, std::size_t offset) const {
-  const Program& program = *unit_->program;
-  const std::uint32_t line_begin = program.pieces[program.block(statement.block).first_piece].begin;
-  const std::uint32_t begin = program.pieces[statement.piece].begin - line_begin;
-  return {statement.block + 1, begin + static_cast<std::uint32_t>(offset) + 1};
+  return {statement.block + 1, statement.column + static_cast<std::uint32_t>(offset)};
+}
+
+std::string_view Executor::flow_text(const FlowStatement& statement) const {
+  return std::string_view(unit_->program->text).substr(statement.begin, statement.length);
 }
 
 void Executor::flow(const BlockWords& block) {
@@ -83,7 +85,7 @@ void Executor::flow(const BlockWords& block) {
 
 /// The value at an offset of the statement; nothing: it has none, which ends the run.
 std::optional<double> Executor::evaluate(const FlowStatement& statement, std::size_t offset) {
-  const std::string_view text = reader_.raw(statement.piece).substr(offset);
+  const std::string_view text = flow_text(statement).substr(offset);
   Evaluated found = values_->value(text);
   if (found.ok() && std::isnan(found.value)) {
     found.problem = "it is vacant: no value was assigned";
@@ -186,7 +188,7 @@ void Executor::macro(const FlowStatement& statement) {
   if (!holds(statement)) return;
   if (statement.text.kind == Kind::macro_if_goto) return go_to(statement);
   const std::size_t offset = statement.text.consequence;
-  const Evaluated found = values_->assign(reader_.raw(statement.piece).substr(offset));
+  const Evaluated found = values_->assign(flow_text(statement).substr(offset));
   if (found.ok()) return values_->finish_block(true);
   stop("NC254", "the assignment cannot be done: " + found.problem,
        flow_place(statement, offset + found.at));

@@ -136,7 +136,7 @@ void Executor::count_loop(const FlowStatement& statement, std::uint32_t number) 
   std::unordered_map<std::uint32_t, long>& ends = unit_->counts;
   if (begins) {
     const std::size_t offset = head.text.consequence;
-    const Evaluated assigned = values_->assign(reader_.raw(head.piece).substr(offset));
+    const Evaluated assigned = values_->assign(flow_text(head).substr(offset));
     if (!assigned.ok()) {
       return stop("NC254", "FOR: " + assigned.problem, flow_place(head, offset + assigned.at));
     }
@@ -281,7 +281,7 @@ bool Executor::enter_section(ProgramUnit& unit, const std::string& name, CallFra
     stop("NC250", "the subprogram " + name + " stands in the text more than once", frame.place);
     return false;
   }
-  if (!frame.scope.arguments.empty() && section->procedure == FlowStatement::kNone) {
+  if (!frame.scope.arguments.empty() && !section->procedure) {
     stop("NC256",
          "the call gives values, but the subprogram " + name +
              " has no PROC that takes "

@@ -101,13 +101,16 @@ Result<InterpretationSummary> Executor::run() {
 }
 
 /// A block of the text that is run; nullptr: the run is void, as the program turned out to jump.
-/// Blocks before the window are gone: of a program that comes back to them the window is the whole
-/// text.
+/// Blocks before the window can be had again of programs that jump, and only those ask for them.
 const Block* Executor::reach(std::size_t index) {
   const Program& program = *unit_->program;
   while (!program.holds(index)) {
-    require(stream_ != nullptr && index >= program.first_block,
-            "the run goes forward through the windows of its program");
+    require(stream_ != nullptr, "a program without windows is whole");
+    if (stream_->jumps()) {
+      stream_->go_to(index);
+      continue;
+    }
+    require(index >= program.first_block, "the run goes forward through the windows");
     if (!stream_->next()) return nullptr;
   }
   return &program.block(index);

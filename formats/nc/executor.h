@@ -97,6 +97,7 @@ class Executor {
   std::optional<double> evaluate(const FlowStatement& statement, std::size_t offset);
   bool holds(const FlowStatement& statement);
   TextPlace flow_place(const FlowStatement& statement, std::size_t offset) const;
+  std::string_view flow_text(const FlowStatement& statement) const;
   const FlowStatement& partner(std::uint32_t number);
   void jump(std::uint32_t statement, bool behind);
   void jump_behind(std::uint32_t statement);

@@ -1,13 +1,13 @@
 #include "formats/nc/flow_index.h"
 
 #include <algorithm>
-#include <optional>
 #include <tuple>
 #include <unordered_set>
 
 #include "formats/nc/number.h"
 #include "formats/nc/siemens_flow.h"
 #include "formats/nc/siemens_words.h"
+#include "kernels/core/contract.h"
 
 namespace smoothpost::nc {
 namespace {
@@ -285,7 +285,7 @@ class Sections {
   }
 
   /// PROC. True: another program begins.
-  bool procedure(std::string_view text, std::uint32_t block, std::uint32_t piece, bool further) {
+  bool procedure(std::string_view text, std::uint32_t block, bool further) {
     const bool fresh = further && begin(block);
     if (fresh || sections_.back().name.empty()) {
       std::size_t at = 4;
@@ -294,7 +294,7 @@ class Sections {
       while (end < text.size() && text[end] != '(' && !detail::is_blank(text[end])) ++end;
       set_name(upper_text(text.substr(at, end - at)), true);
     }
-    sections_.back().procedure = piece;
+    sections_.back().procedure = true;
     used_ = true;
     return fresh;
   }
@@ -334,11 +334,11 @@ bool is_section(const Piece& piece) {
 
 /// True: another program begins with this piece.
 bool add_section(Sections& sections, const Program& program, const Piece& piece,
-                 std::uint32_t block, std::uint32_t number) {
+                 std::uint32_t block) {
   const std::string_view text = text_of(program, piece);
   const auto word = static_cast<SiemensWord>(piece.detail);
   if (word == SiemensWord::program_name) return sections.header(text, block);
-  return sections.procedure(text, block, number, word == SiemensWord::further_procedure);
+  return sections.procedure(text, block, word == SiemensWord::further_procedure);
 }
 
 }  // namespace
@@ -380,51 +380,78 @@ std::vector<std::uint32_t> FlowIndex::numbered(std::uint32_t region, long number
   return out;
 }
 
-FlowIndex index_flow(const Program& program) {
+struct FlowIndexer::State {
+  explicit State(InputDialect dialect)
+      : numbers(dialect != InputDialect::linuxcnc),
+        siemens(dialect == InputDialect::siemens),
+        sections(index.sections) {}
+
+  void take(const Program& program, const Block& block, std::uint32_t number);
+  void take(const Program& program, const Block& block, const Piece& piece, std::uint32_t number);
+
+  bool numbers, siemens;
   FlowIndex index;
-  Pairing pairing(index);
-  const bool numbers = program.dialect != InputDialect::linuxcnc;
-  const bool siemens = program.dialect == InputDialect::siemens;
-  std::optional<Sections> sections;
-  if (siemens) sections.emplace(index.sections);
+  Pairing pairing{index};
+  Sections sections;  ///< siemens
   std::uint32_t region = 0;
-  for (std::uint32_t b = 0; b < program.blocks.size(); ++b) {
-    const Block& block = program.blocks[b];
-    for (std::uint32_t i = block.first_piece; i < block.first_piece + block.piece_count; ++i) {
-      const Piece& piece = program.pieces[i];
-      if (siemens && is_section(piece)) {
-        if (add_section(*sections, program, piece, b, i)) {
-          pairing.end_region();
-          region = b;
-        }
-        continue;
-      }
-      if (siemens && piece.kind != PieceKind::space && piece.kind != PieceKind::line_end &&
-          piece.kind != PieceKind::comment) {
-        sections->use();
-      }
-      if (piece.kind == PieceKind::flow) {
-        FlowStatement statement;
-        statement.text = read(program, piece);
-        statement.block = b;
-        statement.piece = i;
-        pairing.add(std::move(statement));
-      } else if (piece.kind == PieceKind::word && piece.letter == 'O') {
-        region = b;
-        const auto [label, fresh] =
-            index.programs.insert({label_number(piece.value), FlowIndex::ProgramLabel{b, false}});
-        if (!fresh) label->second.twice = true;
-        index.regions.push_back(b);
-        if (numbers) pairing.end_region();
-      } else if (is_label(program, piece)) {
-        index.labels[label_name(program, piece)].push_back(b);
-      } else if (numbers && piece.kind == PieceKind::word && piece.letter == 'N') {
-        index.numbers.push_back({region, label_number(piece.value), b});
-      }
-    }
+};
+
+void FlowIndexer::State::take(const Program& program, const Block& block, std::uint32_t number) {
+  for (std::uint32_t i = block.first_piece; i < block.first_piece + block.piece_count; ++i)
+    take(program, block, program.pieces[i], number);
+}
+
+void FlowIndexer::State::take(const Program& program, const Block& block, const Piece& piece,
+                              std::uint32_t number) {
+  if (siemens && is_section(piece)) {
+    if (!add_section(sections, program, piece, number)) return;
+    pairing.end_region();
+    region = number;
+    return;
   }
-  pairing.finish();
-  if (siemens) sections->finish(static_cast<std::uint32_t>(program.blocks.size()));
+  if (siemens && piece.kind != PieceKind::space && piece.kind != PieceKind::line_end &&
+      piece.kind != PieceKind::comment) {
+    sections.use();
+  }
+  if (piece.kind == PieceKind::flow) {
+    FlowStatement statement;
+    statement.text = read(program, piece);
+    statement.block = number;
+    statement.begin = piece.begin;
+    statement.length = piece.length;
+    statement.column = piece.begin - program.pieces[block.first_piece].begin + 1;
+    pairing.add(std::move(statement));
+  } else if (piece.kind == PieceKind::word && piece.letter == 'O') {
+    region = number;
+    const auto [label, fresh] =
+        index.programs.insert({label_number(piece.value), FlowIndex::ProgramLabel{number, false}});
+    if (!fresh) label->second.twice = true;
+    index.regions.push_back(number);
+    if (numbers) pairing.end_region();
+  } else if (is_label(program, piece)) {
+    index.labels[label_name(program, piece)].push_back(number);
+  } else if (numbers && piece.kind == PieceKind::word && piece.letter == 'N') {
+    index.numbers.push_back({region, label_number(piece.value), number});
+  }
+}
+
+FlowIndexer::FlowIndexer(InputDialect dialect) : state_(std::make_unique<State>(dialect)) {}
+
+FlowIndexer::~FlowIndexer() = default;
+
+void FlowIndexer::add(const Program& window) {
+  for (std::size_t b = 0; b < window.blocks.size(); ++b)
+    state_->take(window, window.blocks[b], static_cast<std::uint32_t>(window.first_block + b));
+}
+
+FlowIndex FlowIndexer::finish(std::size_t blocks) {
+  FlowIndex& index = state_->index;
+  state_->pairing.finish();
+  if (state_->siemens) {
+    state_->sections.finish(static_cast<std::uint32_t>(blocks));
+  } else {
+    index.sections.clear();
+  }
   std::sort(index.numbers.begin(), index.numbers.end(),
             [](const FlowIndex::Numbered& a, const FlowIndex::Numbered& b) {
               return std::tuple(a.region, a.number, a.block) <
@@ -438,7 +465,14 @@ FlowIndex index_flow(const Program& program) {
       if (statement.end == kNone) statement.fault = "the loop has no end";
     }
   }
-  return index;
+  return std::move(index);
+}
+
+FlowIndex index_flow(const Program& program) {
+  require(program.is_whole(), "the flow of a whole program");
+  FlowIndexer indexer(program.dialect);
+  indexer.add(program);
+  return indexer.finish(program.block_count);
 }
 
 }  // namespace smoothpost::nc

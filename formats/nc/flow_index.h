@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -17,7 +18,9 @@ struct FlowStatement {
 
   FlowText text;
   std::uint32_t block = 0;
-  std::uint32_t piece = 0;
+  std::uint32_t begin = 0;  ///< bytes of Program::text that `text` was read from
+  std::uint32_t length = 0;
+  std::uint32_t column = 0;
   bool closes_do = false;         ///< while at the end of do
   std::uint32_t partner = kNone;  ///< sub and endsub, loop begin and end; if, elseif: the next one
                                   ///< of the branch; break, continue: the begin of the loop
@@ -43,8 +46,8 @@ struct FlowIndex {
     std::string name;         ///< upper case; empty: the text before the first of such lines
     std::uint32_t begin = 0;  ///< block
     std::uint32_t end = 0;    ///< block behind the last one
-    std::uint32_t procedure = FlowStatement::kNone;  ///< piece of its PROC
-    bool subprogram = false;                         ///< %_N_NAME_SPF or PROC
+    bool procedure = false;   ///< it has a PROC
+    bool subprogram = false;  ///< %_N_NAME_SPF or PROC
   };
 
   std::vector<FlowStatement> statements;                ///< in order of the text
@@ -72,7 +75,21 @@ struct FlowIndex {
 /// crossed partner, a subroutine within a subroutine or a loop, a label that its subroutine (or the
 /// main program) has already used, return outside a subroutine, break and continue outside a while
 /// or do of their label, more than 100 of them within each other. Cost: one pass over the pieces.
-/// @pre program.is_whole()
+class FlowIndexer {
+ public:
+  explicit FlowIndexer(InputDialect dialect);
+  ~FlowIndexer();
+  /// Takes the blocks that are in `window`, which follow those of the window before.
+  void add(const Program& window);
+  /// The index of the `blocks` blocks of the text. Once.
+  FlowIndex finish(std::size_t blocks);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// The index of a program that is not read in windows. @pre program.is_whole()
 FlowIndex index_flow(const Program& program);
 
 }  // namespace smoothpost::nc

@@ -34,6 +34,9 @@ Class class_of(char c) { return kClasses[static_cast<unsigned char>(c)]; }
 class Rs274Builder final : public TreeBuilder {
  public:
   using TreeBuilder::TreeBuilder;
+  std::unique_ptr<TreeBuilder> clone() const override {
+    return std::make_unique<Rs274Builder>(*this);
+  }
 
  protected:
   void content(const char* p) override {
@@ -198,7 +201,7 @@ class Rs274Builder final : public TreeBuilder {
     while (rest != line_end_ && detail::is_blank(*rest)) ++rest;
     if (!only_blanks_ || rest != line_end_) return construct(begin);
     const bool opens = !percent_seen_ && !words_seen_;
-    if (!opens && !percent_seen_ && !ended_ && is_linuxcnc()) {
+    if (!opens && !percent_seen_ && !ended_ && !again_ && is_linuxcnc()) {
       log_.warning("NC112",
                    "this % closes a program that no % opened: it is read as the end of the "
                    "program, but LinuxCNC refuses it; write a % on the first line too",

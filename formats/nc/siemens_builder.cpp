@@ -1,5 +1,6 @@
 #include "formats/nc/siemens_builder.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "formats/nc/codes.h"
@@ -209,7 +210,7 @@ const char* SiemensBuilder::header(const char* begin) {
                      (text.ends_with("_MPF") || text.ends_with("_SPF"));
   if (!names) return statement(SiemensWord::no_effect, begin, line_end_);
   program_.has_flow = program_.has_flow || words_seen_;
-  declared_.clear();
+  forget_declared();
   program_began_ = false;
   header_ = true;
   return statement(SiemensWord::program_name, begin, end);
@@ -289,7 +290,7 @@ const char* SiemensBuilder::array(const char* begin, const char* bracket) {
   const std::string name = upper_text({begin, static_cast<std::size_t>(name_end - begin)});
   const bool assigns = behind != line_end_ && *behind == '=';
   const char* value = assigns ? skip_blanks(behind + 1) : line_end_;
-  if (assigns && (declared_.contains(name) || name == "R")) {
+  if (assigns && (is_declared(name) || name == "R")) {
     const Evaluated found = assign_siemens(rest_of_line(begin), nullptr);
     if (!found.ok()) return refuse_value(begin, begin, found);
     push(PieceKind::assignment, begin, begin + found.length);
@@ -350,7 +351,7 @@ const char* SiemensBuilder::assigned(const char* begin, const char* name_end, co
   const char* value = skip_blanks(equals + 1);
   if (const char known = siemens_address(text)) return address(begin, known, value);
   const std::string name = upper_text(text);
-  const bool variable = is_r_parameter(name) || declared_.contains(name);
+  const bool variable = is_r_parameter(name) || is_declared(name);
   const bool tolerance = is_siemens_tolerance(name);
   if (variable && !tolerance) {
     const Evaluated found = assign_siemens(rest_of_line(begin), nullptr);
@@ -426,13 +427,26 @@ const char* SiemensBuilder::tool_name(const char* begin, const char* quote) {
   return span.next;
 }
 
+void SiemensBuilder::declare(const std::string& name) {
+  if (!again_) (*declarations_)[name].push_back(declared_);
+  ++declared_;
+}
+
+bool SiemensBuilder::is_declared(const std::string& name) const {
+  const auto known = declarations_->find(name);
+  if (known == declarations_->end()) return false;
+  const std::vector<std::uint32_t>& numbers = known->second;
+  const auto found = std::lower_bound(numbers.begin(), numbers.end(), first_declared_);
+  return found != numbers.end() && *found < declared_;
+}
+
 /// DEF REAL a, b=2.5, c[5]
 const char* SiemensBuilder::declaration(const char* begin) {
   const char* end = end_of_statement(begin);
   const std::string_view text(begin, static_cast<std::size_t>(end - begin));
   std::vector<std::string> names;
   const Evaluated found = declare_siemens(text, nullptr, &names);
-  declared_.insert(names.begin(), names.end());
+  for (const std::string& name : names) declare(name);
   if (!found.ok() || found.length != text.size()) {
     return push_refused("NC140",
                         "DEF: " + (found.ok() ? "text behind the variables" : found.problem) +
@@ -459,10 +473,10 @@ const char* SiemensBuilder::procedure(const char* begin) {
                         text);
   }
   if (further) {
-    declared_.clear();
+    forget_declared();
     program_.has_flow = true;
   }
-  for (const auto& parameter : head.parameters) declared_.insert(parameter.first);
+  for (const auto& parameter : head.parameters) declare(parameter.first);
   return statement(further ? SiemensWord::further_procedure : SiemensWord::procedure, begin, end);
 }
 

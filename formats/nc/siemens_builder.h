@@ -1,7 +1,10 @@
 #pragma once
 
+#include <cstdint>
+#include <memory>
 #include <string>
-#include <unordered_set>
+#include <unordered_map>
+#include <vector>
 
 #include "formats/nc/siemens_assignment.h"
 #include "formats/nc/siemens_words.h"
@@ -15,6 +18,9 @@ namespace smoothpost::nc {
 class SiemensBuilder final : public TreeBuilder {
  public:
   using TreeBuilder::TreeBuilder;
+  std::unique_ptr<TreeBuilder> clone() const override {
+    return std::make_unique<SiemensBuilder>(*this);
+  }
 
  protected:
   void content(const char* begin) override;
@@ -44,10 +50,18 @@ class SiemensBuilder final : public TreeBuilder {
   const char* behind_frame(const char* begin) const;
   const char* behind_group(const char* open, char close) const;
 
-  std::unordered_set<std::string> declared_;  ///< variables of the program that is read
-  std::size_t first_piece_ = 0;               ///< of this line
-  bool header_ = false;                       ///< this line is one
-  bool program_began_ = false;                ///< behind its header words came
+  void declare(const std::string& name);
+  void forget_declared() { first_declared_ = declared_; }
+  bool is_declared(const std::string& name) const;
+
+  /// The variables of the program that is read are those that were declared with a number from
+  /// first_declared_ to declared_ − 1. Of a name all its numbers in the text, which clones share.
+  using Declarations = std::unordered_map<std::string, std::vector<std::uint32_t>>;
+  std::shared_ptr<Declarations> declarations_ = std::make_shared<Declarations>();
+  std::uint32_t first_declared_ = 0, declared_ = 0;
+  std::size_t first_piece_ = 0;  ///< of this line
+  bool header_ = false;          ///< this line is one
+  bool program_began_ = false;   ///< behind its header words came
 };
 
 }  // namespace smoothpost::nc

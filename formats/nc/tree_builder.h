@@ -26,6 +26,11 @@ class TreeBuilder {
     if (program.text.starts_with("\xEF\xBB\xBF")) bom_ = 3;  // byte order mark of some editors
   }
   virtual ~TreeBuilder() = default;
+  /// At the same place of the same program.
+  virtual std::unique_ptr<TreeBuilder> clone() const = 0;
+
+  /// From now on lines are read that another has read before: their faults are told.
+  void read_again() { again_ = true; }
 
   /// Appends all further lines.
   void read_all() {
@@ -48,6 +53,7 @@ class TreeBuilder {
   bool at_end() const { return next_ == text_end_; }
 
  protected:
+  TreeBuilder(const TreeBuilder&) = default;
   /// Pushes the pieces of one line from `begin` to line_end_.
   virtual void content(const char* begin) = 0;
 
@@ -81,6 +87,7 @@ class TreeBuilder {
   }
 
   void error(const char* code, std::string why, const char* where) {
+    if (again_) return;
     if (!quiet_) {
       if (program_.first_fault == 0) program_.first_fault = line_number_;
       return log_.error(code, std::move(why), place(where));
@@ -139,6 +146,7 @@ class TreeBuilder {
   bool percent_closes_ = false;
   bool ended_ = false;  ///< the end of the program stands in a line before or in this one
   bool quiet_ = false;  ///< this line is behind the end of the program
+  bool again_ = false;  ///< this line was read before
 
  private:
   const char* line(const char* begin) {

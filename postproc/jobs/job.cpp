@@ -3,17 +3,13 @@
 #include <algorithm>
 #include <exception>
 #include <filesystem>
-#include <map>
 
-#include "formats/mesh/stl_reader.h"
 #include "kernels/core/contract.h"
-#include "kernels/core/units.h"
-#include "kernels/geometry/mesh_report.h"
-#include "kernels/geometry/weld.h"
 #include "postproc/jobs/batch.h"
 #include "postproc/jobs/files.h"
 #include "postproc/jobs/finish.h"
 #include "postproc/jobs/golden.h"
+#include "postproc/jobs/job_input.h"
 #include "postproc/jobs/job_texts.h"
 #include "postproc/jobs/machine_commands.h"
 #include "postproc/jobs/place.h"
@@ -30,8 +26,6 @@ namespace smoothpost {
 namespace fs = std::filesystem;
 
 namespace {
-
-constexpr const char* kConversational = "heidenhain";  // a dialect that is a format of its own
 
 std::string base_name(const std::string& path) { return fs::path(path).filename().string(); }
 
@@ -319,7 +313,7 @@ class Run {
   }
 
   bool read_program(ConvertInput& in) {
-    auto input = read_cam_program(input_name_, std::move(input_bytes_));
+    auto input = read_cam(input_name_, std::move(input_bytes_));
     if (!input) return false;
     in.input = std::move(*input);
     return true;
@@ -335,116 +329,21 @@ class Run {
     context_.input_files.push_back(
         {base_name(options_.against), sha256(bytes.value()), options_.against});
     note({{options_.against, sha256(bytes.value())}});
-    in.against = read_cam_program(options_.against, std::move(bytes.value()));
+    in.against = read_cam(options_.against, std::move(bytes.value()));
     return in.against.has_value();
   }
 
-  /// --input-dialect heidenhain is the format of that name for every name of a file but CL and CSV.
-  const InputFormat* format_of(const std::string& name) const {
-    const InputFormat* format = options_.input_format.empty()
-                                    ? format_by_extension(name)
-                                    : find_input_format(options_.input_format);
-    const bool words = format == nullptr ? options_.input_format.empty() : format->has_words;
-    return words && options_.input_dialect == kConversational ? find_input_format(kConversational)
-                                                              : format;
-  }
-
-  std::optional<InterpretedInput> read_cam_program(const std::string& name, std::string bytes) {
+  std::optional<InterpretedInput> read_cam(const std::string& name, std::string bytes) {
     if (wants_page()) page_text_ = bytes;
-    const InputFormat* format = format_of(name);
-    if (!format) {
-      add(usage_error("US103",
-                      options_.input_format.empty()
-                          ? "the format of " + name +
-                                " cannot be told from its name: say --input-format nc|cl|csv"
-                          : "--input-format " + options_.input_format +
-                                " is not read in this version; possible: cl, csv, heidenhain, nc"));
-      return {};
-    }
-    context_.input_format = format->name;
-    InputSettings settings;
-    settings.file_name = name;
-    if (!input_settings(settings)) return {};
-    auto read = format->read(std::move(bytes), settings);
-    add(read.diagnostics());
-    if (!read.ok()) return {};
-    context_.input_dialect = read.value().dialect;
-    const auto& files = read.value().files;
-    context_.input_files.insert(context_.input_files.end(), files.begin(), files.end());
-    for (const InputFile& file : files) note({{file.path, file.sha256}});
-    return std::move(read.value());
-  }
-
-  bool read_dialect(InputSettings& settings) {
-    if (!options_.input_dialect.empty() && options_.input_dialect != kConversational) {
-      settings.dialect = input_dialect(options_.input_dialect);
-      if (!settings.dialect) {
-        add(usage_error("US122", "--input-dialect " + options_.input_dialect +
-                                     " is not read in this version; possible: linuxcnc, fanuc, "
-                                     "haas, siemens, heidenhain"));
-        return false;
-      }
-    }
-    if (options_.integer_unit.empty()) return true;
-    settings.integer_unit = read_number(options_.integer_unit);
-    if (settings.integer_unit && (*settings.integer_unit == 1.0 || *settings.integer_unit == 0.001))
-      return true;
-    add(usage_error("US159", "--integer-unit " + options_.integer_unit +
-                                 ": expected is 1 (X10 is 10 mm) or 0.001 (X10 is 0.010 mm)"));
-    return false;
-  }
-
-  bool input_settings(InputSettings& settings) {
-    if (!read_dialect(settings)) return false;
-    const bool from_file =
-        !options_.against.empty() || (!options_.input_data && options_.input != "-");
-    if (from_file) {
-      const auto folder = fs::path(settings.file_name).parent_path();
-      settings.subroutine_folders = {folder.empty() ? "." : folder.string()};
-    }
-    const auto bounds = read_run_bounds(options_);
-    add(bounds.diagnostics());
-    if (!bounds.ok()) return false;
-    settings.run_budget = bounds.value().run_budget;
-    settings.call_depth = bounds.value().call_depth;
-    auto cl = read_cl_options(options_);
-    add(cl.diagnostics());
-    if (!cl.ok()) return false;
-    settings.cl = std::move(cl.value());
-    if (!options_.input_machine.empty()) {
-      auto machine = load_machine(options_.input_machine, options_, {});
-      add(machine.diagnostics());
-      if (!machine.ok()) return false;
-      note(machine.value().files);
-      settings.machine = std::move(machine.value().definition);
-    }
-    if (!options_.process.empty()) {
-      const auto bytes = read_file(options_.process, std::size_t{16} << 20);
-      add(bytes.diagnostics());
-      if (!bytes.ok()) return false;
-      note({{options_.process, sha256(bytes.value())}});
-      auto process = parse_process_file(bytes.value(), options_.process);
-      add(process.diagnostics());
-      if (!process.ok()) return false;
-      settings.process = std::move(process.value());
-    }
-    auto tools = read_tools(options_.tool);
-    const auto offsets = read_offsets(options_.input_work_offset, "--input-work-offset");
-    add(tools.diagnostics());
-    add(offsets.diagnostics());
-    if (!tools.ok() || !offsets.ok()) return false;
-    settings.tool_lengths = std::move(tools.value().lengths);
-    settings.tool_diameters = std::move(tools.value().diameters);
-    settings.tool_numbers = std::move(tools.value().numbers);
-    for (const auto& offset : offsets.value()) {
-      nc::WorkOffset words;
-      for (int i = 0; i < 3; ++i) {
-        words.words[static_cast<std::size_t>(i)] = offset.position[i];
-        words.words[static_cast<std::size_t>(i) + 3] = offset.turn[i];
-      }
-      settings.work_offsets[offset.system] = words;
-    }
-    return true;
+    CamProgram program = read_cam_program(options_, name, std::move(bytes));
+    context_.input_format = program.format;
+    note(program.files);
+    add(program.input.diagnostics());
+    if (!program.input.ok()) return {};
+    InterpretedInput& input = program.input.value();
+    context_.input_dialect = input.dialect;
+    context_.input_files.insert(context_.input_files.end(), input.files.begin(), input.files.end());
+    return std::move(input);
   }
 
   // Where the program's zero lies on the output machine. `system`: the one that the program uses.
@@ -508,23 +407,10 @@ class Run {
 
   bool read_mesh(const std::string& bytes, const std::string& name,
                  std::optional<TriangleMesh>& part) {
-    StlSettings settings;
-    const std::map<std::string, double> units{
-        {"", 1.0}, {"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"inch", kMillimetresPerInch}};
-    const auto unit = units.find(options_.workpiece_unit);
-    if (unit == units.end()) {
-      add(usage_error("US145", "--workpiece-unit " + options_.workpiece_unit +
-                                   ": expected is mm, cm, m or inch"));
-      return false;
-    }
-    settings.scale = unit->second;
-    const auto stl = read_stl(bytes, name, settings);
-    add(stl.diagnostics());
-    if (!stl.ok()) return false;
-    part = weld(stl.value().corners);
-    add(mesh_findings(describe(*part), name));
-    add(surface_findings(report_surface(*part), name));
-    return true;
+    auto mesh = smoothpost::read_mesh(options_, bytes, name);
+    add(mesh.diagnostics());
+    if (mesh.ok()) part = std::move(mesh.value());
+    return mesh.ok();
   }
 
   void report(const Conversion& conversion, const PageParts& parts) {

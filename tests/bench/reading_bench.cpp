@@ -10,6 +10,7 @@
 #include "formats/nc/interpreter.h"
 #include "formats/nc/parser.h"
 #include "formats/nc/program_stream.h"
+#include "tests/support/quiet_sink.h"
 
 // Reading NC text: parse() alone, parse() with interpret(), the same in windows (what a conversion
 // does), and two floors of the same run:
@@ -60,15 +61,9 @@ const std::string& three_axis_program() {
   return text;
 }
 
-struct NullSink final : CanonicalSink {
+struct TimeSink final : test::QuietSink {
   double sum = 0.0;
   void motion(const CanonicalMotion& m) override { sum += m.duration; }
-  void dwell(double, std::uint32_t) override {}
-  void event(const ProcessEvent&) override {}
-  void comment(std::string_view, std::uint32_t) override {}
-  void tool_length(double, int, std::uint32_t) override {}
-  void work_offset(const Vec3&, double, int, std::uint32_t) override {}
-  void program_end(std::uint32_t) override {}
 };
 
 std::size_t count_lines(const std::string& text) {
@@ -173,7 +168,7 @@ void parse_only(benchmark::State& state) {
 void parse_and_interpret(benchmark::State& state) {
   timed(state, [&](std::string& text) {
     const nc::ParsedProgram parsed = nc::parse(std::move(text), "p.ngc");
-    NullSink sink;
+    TimeSink sink;
     const auto result = nc::interpret(parsed.program, {}, sink);
     if (!result.ok()) state.SkipWithError("the program was refused");
     benchmark::DoNotOptimize(sink.sum);
@@ -183,7 +178,7 @@ void parse_and_interpret(benchmark::State& state) {
 void read_in_windows(benchmark::State& state) {
   timed(state, [&](std::string& text) {
     nc::ProgramStream stream(std::move(text), "p.ngc", nc::InputDialect::linuxcnc, {});
-    NullSink sink;
+    TimeSink sink;
     const auto result = nc::interpret(stream, {}, sink);
     if (!result.ok()) state.SkipWithError("the program was refused");
     benchmark::DoNotOptimize(sink.sum);

@@ -11,9 +11,16 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+struct Host {
+  Clock::time_point start = Clock::now();
+  bool gave_up = false;
+};
+
 // Gives up after a second: no input may keep a run from asking.
 int impatient(void* user, const char*, double) {
-  return Clock::now() - *static_cast<const Clock::time_point*>(user) > std::chrono::seconds(1);
+  Host& host = *static_cast<Host*>(user);
+  host.gave_up = host.gave_up || Clock::now() - host.start > std::chrono::seconds(1);
+  return host.gave_up;
 }
 
 }  // namespace
@@ -44,15 +51,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const char* tools[] = {"1=60"};
   options.tool = tools;
   options.tool_count = 1;
-  Clock::time_point start = Clock::now();
+  Host host;
   options.progress = impatient;
-  options.progress_user = &start;
+  options.progress_user = &host;
 
   using smoothpost::fuzz::expect;
   smoothpost_result* result = nullptr;
   const smoothpost_status status = smoothpost_run(&options, &result);
   expect(result != nullptr && smoothpost_result_status(result) == status);
-  expect(status != SMOOTHPOST_INTERNAL && status != SMOOTHPOST_USAGE);
+  expect(status != SMOOTHPOST_INTERNAL);
+  expect((status == SMOOTHPOST_USAGE) == host.gave_up);
   std::size_t length = 0;
   const char* program = smoothpost_result_program(result, &length);
   expect(program[length] == '\0');

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "tests/formats/cl/recording.h"
+#include "tests/support/quiet_sink.h"
 #include "tests/support/support.h"
 
 // Real files that nobody of this project wrote, and the samples of the notes on dialects.
@@ -273,7 +274,7 @@ struct Outcome {
   std::size_t refused = 0;
 };
 
-struct FiniteSink final : CanonicalSink {
+struct FiniteSink final : QuietSink {
   bool good = true;
   void motion(const CanonicalMotion& m) override {
     for (const double v : m.end) good = good && std::isfinite(v);
@@ -282,11 +283,6 @@ struct FiniteSink final : CanonicalSink {
            std::abs(m.arc.normal.norm() - 1.0) < 1e-9;
   }
   void dwell(double seconds, std::uint32_t) override { good = good && seconds >= 0.0; }
-  void event(const ProcessEvent&) override {}
-  void comment(std::string_view, std::uint32_t) override {}
-  void tool_length(double, int, std::uint32_t) override {}
-  void work_offset(const Vec3&, double, int, std::uint32_t) override {}
-  void program_end(std::uint32_t) override {}
 };
 
 void require_outcome(const std::string& text, Outcome& outcome) {

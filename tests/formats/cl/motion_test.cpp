@@ -3,6 +3,7 @@
 #include <ctime>
 
 #include "tests/formats/cl/recording.h"
+#include "tests/support/quiet_sink.h"
 
 namespace smoothpost::test {
 namespace {
@@ -205,15 +206,9 @@ TEST_CASE("motion: after an error reading goes on and motions after it are judge
 
 namespace {
 
-struct CountingSink final : CanonicalSink {
+struct CountingSink final : QuietSink {
   std::size_t motions = 0;
   void motion(const CanonicalMotion&) override { ++motions; }
-  void dwell(double, std::uint32_t) override {}
-  void event(const ProcessEvent&) override {}
-  void comment(std::string_view, std::uint32_t) override {}
-  void tool_length(double, int, std::uint32_t) override {}
-  void work_offset(const Vec3&, double, int, std::uint32_t) override {}
-  void program_end(std::uint32_t) override {}
 };
 
 double seconds_of(std::size_t lines) {

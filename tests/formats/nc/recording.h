@@ -72,17 +72,6 @@ struct Recording final : CanonicalSink {
   }
 };
 
-/// A sink that does nothing.
-struct NullSink final : CanonicalSink {
-  void motion(const CanonicalMotion&) override {}
-  void dwell(double, std::uint32_t) override {}
-  void event(const ProcessEvent&) override {}
-  void comment(std::string_view, std::uint32_t) override {}
-  void tool_length(double, int, std::uint32_t) override {}
-  void work_offset(const Vec3&, double, int, std::uint32_t) override {}
-  void program_end(std::uint32_t) override {}
-};
-
 struct Run {
   Recording sink;
   bool ok = false;          ///< neither parse nor interpret found an error

@@ -13,6 +13,7 @@
 #include "postproc/pipeline/cuts.h"
 #include "postproc/pipeline/registry.h"
 #include "postproc/pipeline/verify.h"
+#include "tests/postproc/pipeline/certified_program.h"
 #include "tests/postproc/pipeline/paths.h"
 
 // Arcs in the place of straight blocks: planned, printed, read back and verified.
@@ -45,26 +46,6 @@ ConvertInput prepare(const std::string& program, const std::string& dialect, con
   in.input_name = "part.ngc";
   in.collision_check = false;
   return in;
-}
-
-Conversion converted(const ConvertInput& in) {
-  Conversion c = convert(in, false, {});
-  for (const auto& d : c.diagnostics) UNSCOPED_INFO(to_string(d));
-  REQUIRE(c.verdict == Verdict::certified);
-  return c;
-}
-
-ReadBack read_text(const ConvertInput& in, const std::string& text) {
-  auto back = find_dialect(in.machine.dialect.name)->read_back(in.machine, text, "p");
-  REQUIRE(back.ok());
-  return back.value();
-}
-
-const Check& find(const Checks& checks, const std::string& name) {
-  for (const auto& check : checks)
-    if (check.name == name) return check;
-  FAIL("no check " << name);
-  return checks.front();
 }
 
 std::vector<std::size_t> arcs_of(const ReadBack& back) {
@@ -123,13 +104,7 @@ TEST_CASE("arc_blocks: fewer blocks, the same path and time, in three planes",
     }
     CHECK(helix);
     const ReadBack straight = read_text(prepare(kPocket, dialect, "lines"), lines.program);
-    REQUIRE(back.events.size() == straight.events.size());
-    for (std::size_t k = 0; k < back.events.size(); ++k) {
-      CHECK(back.events[k].name == straight.events[k].name);
-      const auto place = [k](const ReadBack& r) { return r.moves[r.events[k].before - 1].to; };
-      if (back.events[k].before > 0)
-        CHECK((place(back) - place(straight)).cwiseAbs().maxCoeff() < 2e-3);
-    }
+    check_same_events(back, straight, 2e-3);
   }
 }
 

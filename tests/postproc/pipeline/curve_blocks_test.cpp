@@ -11,9 +11,9 @@
 #include "postproc/pipeline/controller_motion.h"
 #include "postproc/pipeline/convert.h"
 #include "postproc/pipeline/cuts.h"
-#include "postproc/pipeline/registry.h"
 #include "postproc/pipeline/tool_motion.h"
 #include "postproc/pipeline/verify.h"
+#include "tests/postproc/pipeline/certified_program.h"
 #include "tests/postproc/pipeline/paths.h"
 
 // Bent moves: planned, printed, read back and verified.
@@ -40,26 +40,6 @@ ConvertInput prepare(const char* curves, const char* to = "head_table_bc") {
   return in;
 }
 
-Conversion converted(const ConvertInput& in) {
-  Conversion c = convert(in, false, {});
-  for (const auto& d : c.diagnostics) UNSCOPED_INFO(to_string(d));
-  REQUIRE(c.verdict == Verdict::certified);
-  return c;
-}
-
-ReadBack read_text(const ConvertInput& in, const std::string& text) {
-  auto back = find_dialect("siemens_840d")->read_back(in.machine, text, "p");
-  REQUIRE(back.ok());
-  return back.value();
-}
-
-const Check& find(const Checks& checks, const std::string& name) {
-  for (const auto& check : checks)
-    if (check.name == name) return check;
-  FAIL("no check " << name);
-  return checks.front();
-}
-
 }  // namespace
 
 TEST_CASE("curve_blocks: fewer blocks, the same path and time", "[postproc][pipeline][curves]") {
@@ -77,14 +57,7 @@ TEST_CASE("curve_blocks: fewer blocks, the same path and time", "[postproc][pipe
     CHECK(c.scheduled_time == Approx(lines.scheduled_time).epsilon(1e-4));
     CHECK(c.program.find("UPATH") != std::string::npos);
     const ReadBack straight = read_text(prepare("lines"), lines.program);
-    REQUIRE(back.events.size() == straight.events.size());
-    for (std::size_t k = 0; k < back.events.size(); ++k) {
-      CHECK(back.events[k].name == straight.events[k].name);
-      // At the same place of the path.
-      const auto place = [k](const ReadBack& r) { return r.moves[r.events[k].before - 1].to; };
-      if (back.events[k].before > 0)
-        CHECK((place(back) - place(straight)).cwiseAbs().maxCoeff() < 1e-4);
-    }
+    check_same_events(back, straight, 1e-4);
   }
 }
 
