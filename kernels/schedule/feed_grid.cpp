@@ -232,11 +232,17 @@ std::vector<double> greville_places(const std::vector<FeedElement>& elements) {
   return places;
 }
 
-std::array<double, 4> cubic_values(const FeedGrid& grid, const std::vector<double>& controls,
-                                   std::size_t e, double d) {
+std::array<double, 4> cubic_of(const FeedGrid& grid, const std::vector<double>& controls,
+                               std::size_t e) {
   std::array<double, 4> c{};
   for (int k = 0; k < 4; ++k)
     for (int j = 0; j < 4; ++j) c[k] += grid.basis[e][4 * k + j] * controls[e + j];
+  return c;
+}
+
+std::array<double, 4> cubic_values(const FeedGrid& grid, const std::vector<double>& controls,
+                                   std::size_t e, double d) {
+  const std::array<double, 4> c = cubic_of(grid, controls, e);
   return {c[0] + d * (c[1] + d * (c[2] + d * c[3])), c[1] + d * (2.0 * c[2] + d * 3.0 * c[3]),
           2.0 * c[2] + 6.0 * d * c[3], 6.0 * c[3]};
 }

@@ -120,6 +120,10 @@ std::vector<std::array<double, 16>> cubic_basis(const std::vector<FeedElement>& 
 /// Greville's places of the controls: where control j of a linear b(w) is b itself.
 std::vector<double> greville_places(const std::vector<FeedElement>& elements);
 
+/// b on element e as a polynomial of w − begin, lowest power first.
+std::array<double, 4> cubic_of(const FeedGrid& grid, const std::vector<double>& controls,
+                               std::size_t e);
+
 /// b and its three derivatives by w at `d` past the start of element e.
 std::array<double, 4> cubic_values(const FeedGrid& grid, const std::vector<double>& controls,
                                    std::size_t e, double d);

@@ -11,6 +11,7 @@ namespace smoothpost {
 namespace {
 
 constexpr int kGauss = 5;
+constexpr double kNear = 1e-9;  // of a part: a Newton step after which the next one is none
 
 double cubic_value(const std::array<double, 4>& c, double d) {
   return c[0] + d * (c[1] + d * (c[2] + d * c[3]));
@@ -49,9 +50,7 @@ LawPart law_part(const FeedStretch& stretch, const FeedGrid& grid,
   double t = 0.0;
   part.times.push_back(t);
   for (std::size_t e = 0; e < elements; ++e) {
-    std::array<double, 4> c{};
-    for (int k = 0; k < 4; ++k)
-      for (int j = 0; j < 4; ++j) c[k] += grid.basis[e][4 * k + j] * controls[e + j];
+    const std::array<double, 4> c = cubic_of(grid, controls, e);
     const double size = grid.elements[e].end - grid.elements[e].begin;
     for (int p = 0; p < LawPart::kParts; ++p) {
       t += time_between(c, size * p / LawPart::kParts, size / LawPart::kParts);
@@ -94,7 +93,7 @@ FeedState FeedProfile::at(double t) const {
     const double late = time_between(c, begin, d) - (t - part.times[index]);
     const double before = d;
     d = std::clamp(d - late * std::sqrt(cubic_value(c, begin + d)), 0.0, size);
-    if (std::abs(d - before) <= 1e-16 * size) break;
+    if (std::abs(d - before) <= kNear * size) break;
   }
   d += begin;
   const auto phi = part.map.at(part.begin[e] + d, part.zone[e]);

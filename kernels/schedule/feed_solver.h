@@ -47,7 +47,8 @@ struct FeedSolution {
 /// ρ = c − s, band Cholesky of half-width 3; steps of 0.99 to the boundary. Stops when s·z is below
 /// tolerance·f and either the dual residual is below 1e-3 or T rests.
 /// Guarantee (test): golden coefficients of the reference.
-/// Deterministic: sums in fixed order.   Cost: about 0.2 µs a point and iteration with 8 lanes.
+/// Deterministic: sums in fixed order.   Cost: about 0.2 µs a point and iteration with 8 lanes
+/// (feed_passes.h).
 /// @pre start has grid.controls() numbers and b > 0 at every point   @throws ContractViolation
 /// Not from a paper; docs/equations.md.
 FeedSolution solve_feed(const FeedProgram& program, std::vector<double> start,

@@ -232,7 +232,7 @@ class Schedule {
     whole_.parts.push_back(std::move(part));
     for (std::size_t e = 0; e < elements; ++e) result_.load = larger(result_.load, law.loads[e]);
     result_.elements += static_cast<int>(elements);
-    const auto bindings = feed_bindings(plan_->stretch, law.grid, law.controls, elements);
+    const auto bindings = FeedCheck(plan_->stretch, law.grid).bindings(law.controls, elements);
     result_.bindings.insert(result_.bindings.end(), bindings.begin(), bindings.end());
   }
 

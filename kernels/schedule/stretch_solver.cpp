@@ -224,7 +224,7 @@ std::vector<FeedElement> fine_elements(const FeedStretch& stretch, const Stretch
 }
 
 /// Draws rows in where the law overshoots and mends it there, a few times; keeps the best.
-void tighten(const FeedStretch& stretch, const StretchSettings& settings, FeedProgram& program,
+void tighten(const StretchSettings& settings, FeedProgram& program, FeedCheck& check,
              FeedSolution solution, StretchLaw& law) {
   StretchLaw now;  // without its grid
   now.loads = law.loads;
@@ -235,7 +235,7 @@ void tighten(const FeedStretch& stretch, const StretchSettings& settings, FeedPr
     draw_in(program, now.loads, kMended);
     const std::vector<bool> changed = mend_law(program, mending, solution);
     law.iterations += solution.iterations;
-    renew_loads(stretch, law.grid, solution.controls, changed, now.loads);
+    check.renew(solution.controls, changed, now.loads);
     now.time = solution.time;
     if (now.time * now.dilation() >= law.time * law.dilation()) continue;
     law.controls = solution.controls;
@@ -271,8 +271,9 @@ StretchLaw solve_resting(const FeedStretch& stretch, const StretchSettings& sett
   law.controls = solution.controls;
   law.time = solution.time;
   law.converged = solution.converged;
-  law.loads = element_loads(stretch, law.grid, law.controls);
-  tighten(stretch, settings, program, std::move(solution), law);
+  FeedCheck check(stretch, law.grid);
+  law.loads = check.loads(law.controls);
+  tighten(settings, program, check, std::move(solution), law);
   FeedProgram last = make_program(stretch, law.grid, settings);
   const double beta = constant_law(last);
   const double constant_time = stretch.map.extent() / std::sqrt(beta);
@@ -280,7 +281,7 @@ StretchLaw solve_resting(const FeedStretch& stretch, const StretchSettings& sett
     law.constant = !law.converged;
     law.controls.assign(law.grid.controls(), beta);
     law.time = constant_time;
-    law.loads = element_loads(stretch, law.grid, law.controls);
+    law.loads = check.loads(law.controls);
   }
   return law;
 }
