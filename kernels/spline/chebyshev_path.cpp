@@ -24,15 +24,22 @@ std::array<Basis, 4> basis(double x) {
   t[0][0] = 1.0;
   t[0][1] = x;
   t[1][1] = 1.0;
-  for (int k = 1; k + 1 < kPoints; ++k)
-    for (int d = 0; d < 4; ++d) {
-      const auto at = [&](int order, int index) {
-        return order < 0 ? 0.0 : t[static_cast<std::size_t>(order)][index];
-      };
-      t[static_cast<std::size_t>(d)][k + 1] =
-          2.0 * x * at(d, k) + 2.0 * d * at(d - 1, k) - at(d, k - 1);
-    }
+  for (int k = 1; k + 1 < kPoints; ++k) {
+    t[0][k + 1] = 2.0 * x * t[0][k] - t[0][k - 1];
+    t[1][k + 1] = 2.0 * x * t[1][k] + 2.0 * t[0][k] - t[1][k - 1];
+    t[2][k + 1] = 2.0 * x * t[2][k] + 4.0 * t[1][k] - t[2][k - 1];
+    t[3][k + 1] = 2.0 * x * t[3][k] + 6.0 * t[2][k] - t[3][k - 1];
+  }
   return t;
+}
+
+// Σ_k t_k c_k from the first k on that counts; `rows` numbers a coefficient. (Eigen's product of a
+// matrix of any height takes its memory from the heap.)
+PathValue sum_of(const double* c, Eigen::Index rows, const Basis& t, int first) {
+  PathValue out = PathValue::Zero(rows);
+  for (int k = first; k < kPoints; ++k)
+    for (Eigen::Index i = 0; i < rows; ++i) out[i] += t[k] * c[k * rows + i];
+  return out;
 }
 
 // Row i: T_k at node i of N times its weight in the discrete cosine sum.
@@ -141,9 +148,10 @@ bool ChebyshevPath::append_jets(const JetFunction& f, double from, double to,
       const PathValue value = c * t, slope = first * t;
       const PathValue range = (jets[0][0] - jets[kJets - 1][0]).cwiseAbs();
       if (i > 0 && pieces() > before) resolved = resolved && meets(c, range);
-      resolved = resolved &&
-                 ((value - wanted[0]).array().abs() <= settings.value * (1.0 + range.array())).all() &&
-                 (slope - wanted[1]).norm() <= 1e-6 * (wanted[1].norm() + centre[1].norm());
+      resolved =
+          resolved &&
+          ((value - wanted[0]).array().abs() <= settings.value * (1.0 + range.array())).all() &&
+          (slope - wanted[1]).norm() <= 1e-6 * (wanted[1].norm() + centre[1].norm());
     }
     if (resolved) {
       coefficients_.push_back(c);
@@ -191,16 +199,18 @@ ChebyshevJet ChebyshevPath::jet(std::size_t piece, double x) const {
   const double a = from(piece), b = to(piece);
   const double scale = 2.0 / (b - a);
   const std::array<Basis, 4> t = basis((x - 0.5 * (a + b)) * scale);
+  const Coefficients& c = coefficients_[piece];
   ChebyshevJet out;
   double factor = 1.0;
   for (std::size_t d = 0; d < 4; ++d, factor *= scale)
-    out[d] = factor * (coefficients_[piece] * t[d]);
+    out[d] = factor * sum_of(c.data(), c.rows(), t[d], static_cast<int>(d));
   return out;
 }
 
 PathValue ChebyshevPath::value(std::size_t piece, double x) const {
   const double a = from(piece), b = to(piece);
-  return coefficients_[piece] * basis((x - 0.5 * (a + b)) * 2.0 / (b - a))[0];
+  const Coefficients& c = coefficients_[piece];
+  return sum_of(c.data(), c.rows(), basis((x - 0.5 * (a + b)) * 2.0 / (b - a))[0], 0);
 }
 
 }  // namespace smoothpost

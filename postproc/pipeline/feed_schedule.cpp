@@ -29,6 +29,18 @@ constexpr double kLeastTime = 1e-4;     // s, of a block that goes nowhere
 constexpr double kNoBlock = 1e-6;       // of a stretch: no way
 constexpr double kFull = 0.995;         // of the programmed feed: not slowed
 
+/// The motion without its position.
+ScheduledStretch::Motion derivatives_at(const ScheduledStretch& stretch, const FeedState& state) {
+  const double c = 1.0 / stretch.slowing;
+  const double v = state.first * c, a = state.second * c * c, j = state.third * c * c * c;
+  const PathJet jet = stretch.joints.jet(stretch.joints.piece_at(state.s), state.s);
+  ScheduledStretch::Motion m;
+  m.velocity = v * jet.first;
+  m.acceleration = v * v * jet.second + a * jet.first;
+  m.jerk = v * v * v * jet.third + 3.0 * v * a * jet.second + j * jet.first;
+  return m;
+}
+
 class Scheduler {
  public:
   Scheduler(const ScheduleInput& input, const Progress& progress)
@@ -246,20 +258,17 @@ class Scheduler {
   static std::array<double, 2> between_ramps(const FeedProfile& profile) {
     const double duration = profile.duration();
     const auto steps = static_cast<int>(std::clamp(duration / kPeakStep, 16.0, 1e6));
-    std::array<double, 2> inside = {0.0, 0.0};
-    bool first = true;
-    bool rising = true;
-    for (int k = 1; k <= steps; ++k) {
-      const FeedState state = profile.at(duration * k / steps);
-      const bool rises = state.second > 0.0;
-      if (rising && !rises) {
-        if (first) inside[0] = state.s;
-        first = false;
-        inside[1] = state.s;
-      }
-      rising = rises;
+    const auto at = [&](int k) { return profile.at(duration * k / steps); };
+    int first = 1;  // the first after which the speed does not rise
+    while (first <= steps && at(first).second > 0.0) ++first;
+    if (first > steps) return {0.0, 0.0};
+    int last = steps;  // the last of those before which it does
+    for (bool falls = !(at(last).second > 0.0); last > first; --last) {
+      const bool fell = !(at(last - 1).second > 0.0);
+      if (falls && !fell) break;
+      falls = fell;
     }
-    return inside;
+    return {at(first).s, at(last).s};
   }
 
   void see_cut_speed(const ScheduledStretch& stretch, const std::array<double, 2>& inside,
@@ -299,8 +308,9 @@ class Scheduler {
     const double step = duration / static_cast<double>(steps);
     for (std::size_t k = 0; k <= steps; ++k) {
       const double t = static_cast<double>(k) * step;
-      const ScheduledStretch::Motion m = stretch.at(t);
-      const std::uint32_t line = line_at(stretch.joints, stretch.profile.at(t / stretch.slowing).s);
+      const FeedState state = stretch.profile.at(t / stretch.slowing);
+      const ScheduledStretch::Motion m = derivatives_at(stretch, state);
+      const std::uint32_t line = line_at(stretch.joints, state.s);
       for (std::size_t j = 0; j < peaks.size(); ++j) {
         JointPeaks& p = peaks[j];
         const auto row = static_cast<Eigen::Index>(j);
@@ -331,14 +341,8 @@ class Scheduler {
 
 ScheduledStretch::Motion ScheduledStretch::at(double t) const {
   const FeedState state = profile.at(t / slowing);
-  const double c = 1.0 / slowing;
-  const double v = state.first * c, a = state.second * c * c, j = state.third * c * c * c;
-  const PathJet jet = joints.jet(joints.piece_at(state.s), state.s);
-  Motion m;
+  Motion m = derivatives_at(*this, state);
   m.position = joints.joints_at(state.s);
-  m.velocity = v * jet.first;
-  m.acceleration = v * v * jet.second + a * jet.first;
-  m.jerk = v * v * v * jet.third + 3.0 * v * a * jet.second + j * jet.first;
   return m;
 }
 
