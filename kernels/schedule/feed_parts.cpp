@@ -12,12 +12,12 @@ namespace smoothpost {
 namespace {
 
 constexpr std::size_t kWhole = 500;      // elements up to which nothing is parted
-constexpr std::size_t kCore = 600;       // elements of a part that it shares with none
-constexpr std::size_t kOverlap = 100;    // beyond its core, each way
+constexpr std::size_t kCore = 1000;      // elements of a part that it shares with none
+constexpr std::size_t kOverlap = 60;     // beyond its core, each way
 constexpr std::size_t kBlend = 12;       // controls over which laws change
 constexpr std::size_t kEndControls = 8;  // of a part, that are not trusted
 constexpr double kApart = 1e-3;          // relative; what is left, mend_law() mends
-constexpr std::size_t kReach = 24;       // elements that are mended with one
+constexpr std::size_t kReach = 12;       // elements that are mended with one
 constexpr std::size_t kWiden = 4;        // times, where that is not enough
 constexpr int kHeld = 3;                 // controls that join what is mended to the rest
 constexpr std::size_t kEased = 4;        // elements beside them

@@ -13,7 +13,7 @@ namespace {
 constexpr int kCoarsePoints = 5;
 constexpr int kLeastCoarse = 20;
 constexpr double kFirstShare = 0.5;  // of the largest constant b, at the start
-constexpr double kCoarseGap = 1e-3, kFineGap = 1e-4, kLastGap = 1e-4;  // of solves, relative to T
+constexpr double kCoarseGap = 1e-2, kFineGap = 1e-4, kLastGap = 1e-4;  // of solves, relative to T
 constexpr int kCoarseIterations = 40;   // its law only says where elements are wanted
 constexpr int kFineIterations = 400;    // 60 to 180 on paths of very uneven feeds
 constexpr double kMostFiner = 40.0;     // fine elements a coarse one, in the mean
