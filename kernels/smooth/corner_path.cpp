@@ -17,6 +17,15 @@ constexpr double kSameBreak = 1e-13;  // of a leg
 constexpr int kBisections = 40;
 constexpr double kMostSlope = 1.1;  // of a blend function, see blend_function.h
 
+/// 1, x, x², …
+template <std::size_t N>
+std::array<double, N> powers(double x) {
+  std::array<double, N> all;
+  all[0] = 1.0;
+  for (std::size_t k = 1; k < N; ++k) all[k] = x * all[k - 1];
+  return all;
+}
+
 /// sin(y)/y and (cos(y) − 1)/y with three derivatives by y, without cancellation.
 struct Circular {
   std::array<double, 4> sine;
@@ -25,15 +34,17 @@ struct Circular {
 
 // Σ over k of the r-th derivative of sign·y^power/factorial, for both series at once.
 Circular circular_series(double y) {
+  constexpr int kTerms = 26;
+  const std::array<double, kTerms> power = powers<kTerms>(y);
   Circular c{};
   double coefficient = 1.0;  // 1/(n+1)!
-  for (int n = 0; n < 26; ++n) {
+  for (int n = 0; n < kTerms; ++n) {
     coefficient /= n + 1.0;
     const double sign = (n / 2) % 2 == 0 ? 1.0 : -1.0;
     auto& series = n % 2 == 0 ? c.sine : c.cosine;
     double factor = n % 2 == 0 ? sign * coefficient : -sign * coefficient;
     for (int r = 0; r <= 3 && r <= n; ++r) {
-      series[static_cast<std::size_t>(r)] += factor * std::pow(y, n - r);
+      series[static_cast<std::size_t>(r)] += factor * power[static_cast<std::size_t>(n - r)];
       factor *= n - r;
     }
   }
@@ -64,11 +75,13 @@ struct HalfAngle {
 HalfAngle half_angle(double s) {
   HalfAngle h;
   if (s < 1.0) {
+    constexpr int kTerms = 12;
+    const std::array<double, kTerms> power = powers<kTerms>(s);
     double coefficient = 0.5;  // (−1/4)^k / (2 (2k + 1)!)
-    for (int k = 0; k < 12; ++k) {
+    for (int k = 0; k < kTerms; ++k) {
       double term = coefficient;
       for (int r = 0; r <= 3 && r <= k; ++r) {
-        h.sine[static_cast<std::size_t>(r)] += term * std::pow(s, k - r);
+        h.sine[static_cast<std::size_t>(r)] += term * power[static_cast<std::size_t>(k - r)];
         term *= k - r;
       }
       coefficient *= -0.25 / ((2.0 * k + 2.0) * (2.0 * k + 3.0));

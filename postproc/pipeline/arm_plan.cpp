@@ -92,16 +92,15 @@ class ArmPlanner {
     return inverse_.nearest(holder(leg, share, spin_), near);
   }
 
-  std::optional<JointJet> jet_on_leg(std::size_t leg, double share, const JointJet& near) const {
-    const std::optional<PoseJet> pose = path_.jet(leg, share);
-    if (!pose) return {};
+  std::optional<JointJet> jet_on_leg(std::size_t leg, double share, const PoseJet& tool,
+                                     const JointJet& near) const {
     const auto q = inverse_.nearest(holder(leg, share, spin_), near.col(0));
     if (!q) return {};
     JointJet known = JointJet::Zero(q->size(), 4);
     known.col(0) = *q;
     FreeJoints free{};
     free.fill(true);
-    return joint_jet(arm_.chain(), known, free, holder_jet(leg, share, *pose));
+    return joint_jet(arm_.chain(), known, free, holder_jet(leg, share, tool));
   }
 
  private:
@@ -511,8 +510,9 @@ Result<JointPlan> plan_arm(const SmoothedPath& path, const SixR& arm,
     plan.value().joints_on_leg = [planner](std::size_t leg, double share, const JointVector& near) {
       return planner->joints_on_leg(leg, share, near);
     };
-    plan.value().jet_on_leg = [planner](std::size_t leg, double share, const JointJet& near) {
-      return planner->jet_on_leg(leg, share, near);
+    plan.value().jet_on_leg = [planner](std::size_t leg, double share, const PoseJet& tool,
+                                        const JointJet& near) {
+      return planner->jet_on_leg(leg, share, tool, near);
     };
   }
   return plan;

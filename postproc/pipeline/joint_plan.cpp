@@ -91,9 +91,8 @@ class Planner {
     return there.q;
   }
 
-  std::optional<JointJet> jet_on_leg(std::size_t leg, double share, const JointJet& near) const {
-    const std::optional<PoseJet> pose = path_.jet(leg, share);
-    if (!pose) return {};
+  std::optional<JointJet> jet_on_leg(std::size_t leg, double share, const PoseJet& tool,
+                                     const JointJet& near) const {
     JointSample there;
     there.segment = static_cast<std::uint32_t>(leg);
     there.s = share;
@@ -103,9 +102,9 @@ class Planner {
     FreeJoints free{};
     for (std::size_t j = 0; j < pair_.chain().joints.size(); ++j)
       free[j] = !pair_.chain().joints[j].redundant;
-    LocationJet target{pose->tip, VectorJet::Zero()};
+    LocationJet target{tool.tip, VectorJet::Zero()};
     for (std::size_t r = 0; r < 4; ++r)
-      target.axis.col(static_cast<Eigen::Index>(r)) = pose->rotation[r].col(2);
+      target.axis.col(static_cast<Eigen::Index>(r)) = tool.rotation[r].col(2);
     if (on_pole(leg, target.axis.col(0))) {
       target.axis = constant_jet(target.axis.col(0).dot(pole_) > 0.0 ? pole_ : Vec3(-pole_));
       const int first = pair_.first_rotary();
@@ -454,8 +453,9 @@ Result<JointPlan> plan_joints(const SmoothedPath& path, const RotaryPair& pair,
     plan.value().joints_on_leg = [planner](std::size_t leg, double share, const JointVector& near) {
       return planner->joints_on_leg(leg, share, near);
     };
-    plan.value().jet_on_leg = [planner](std::size_t leg, double share, const JointJet& near) {
-      return planner->jet_on_leg(leg, share, near);
+    plan.value().jet_on_leg = [planner](std::size_t leg, double share, const PoseJet& tool,
+                                        const JointJet& near) {
+      return planner->jet_on_leg(leg, share, tool, near);
     };
   }
   return plan;

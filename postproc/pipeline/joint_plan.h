@@ -49,11 +49,12 @@ struct JointSample {
 using JointsOnLeg = std::function<std::optional<JointVector>(std::size_t leg, double share,
                                                              const JointVector& near)>;
 
-/// The same with the derivatives by the share, where the leg has them (SmoothedPath::jet) and the
-/// joints follow from the tool alone. `near`: column 0 as above, column 1 the rate of joints that
-/// do not follow from the tool (the first rotary while the tool axis stands on its pole).
-using JointJetOnLeg =
-    std::function<std::optional<JointJet>(std::size_t leg, double share, const JointJet& near)>;
+/// The same with the derivatives by the share, where the leg has them and the joints follow from
+/// the tool alone. `tool`: SmoothedPath::jet() there. `near`: column 0 as above, column 1 the rate
+/// of joints that do not follow from the tool (the first rotary while the tool axis stands on its
+/// pole).
+using JointJetOnLeg = std::function<std::optional<JointJet>(
+    std::size_t leg, double share, const PoseJet& tool, const JointJet& near)>;
 
 /// A place inside a cut that has no continuous way on: the cut has to be split there.
 using SplitPlace = PathPlace;

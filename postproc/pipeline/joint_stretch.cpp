@@ -283,9 +283,10 @@ class StretchBuilder {
     JointJet guess = JointJet::Zero(n, 4);
     guess.col(0) = near(share);
     guess.col(1) = near_rate(share);
-    const auto joints = in_.plan.jet_on_leg(leg, share, guess);
-    if (!joints) return {};
     const auto tool = in_.path.jet(leg, share);
+    if (!tool) return {};
+    const auto joints = in_.plan.jet_on_leg(leg, share, *tool, guess);
+    if (!joints) return {};
     ChebyshevJet jet;
     double scale = 1.0;
     for (std::size_t r = 0; r < 4; ++r, scale /= extent) {
