@@ -18,6 +18,7 @@ constexpr std::string_view kAxisLetters = "XYZABCUVW";
 constexpr std::string_view kTipLetters = "XYZ";
 constexpr int kVectorDigits = 8;
 constexpr int kGuardDigits = 5;
+constexpr int kMostTools = 400;                     // of offset memory C
 constexpr double kShortestBlock = 60.0 / 9999.999;  // s: F of G93 has four digits before the point
 
 class Emitter : public gcode::GcodePrinter {
@@ -36,8 +37,7 @@ class Emitter : public gcode::GcodePrinter {
       const char letter = machine.axes[static_cast<std::size_t>(j)].letter;
       if (kTipLetters.find(letter) != std::string_view::npos) tip_joints_ |= JointMask{1} << j;
     }
-    first_offset_ = offset_of_first_tool_move();
-    offset_ = 1;
+    tools_ = gcode::tools_of(program, kMostTools);
   }
 
  private:
@@ -82,9 +82,10 @@ class Emitter : public gcode::GcodePrinter {
     if (!program().certified)
       comment("NOT CERTIFIED. Written with --force: read the report before you run it");
     for (const auto& title : program().title) comment(title);
-    if (has_poses())
-      comment("H" + std::to_string(first_offset_) + " has to hold tool length " +
-              guard_number(program().tool_length) + ", G54 the place of the part");
+    for (const gcode::ProgramTool& tool : tools_)
+      comment("H" + std::to_string(tool.number) + " has to hold tool length " +
+              guard_number(tool.length) +
+              (&tool == tools_.data() ? ", G54 the place of the part" : ""));
     for (; own < start.size(); ++own) own_line(start[own]);
     modal_words();
     if (machine().dialect.offset_guard) guard();
@@ -156,11 +157,13 @@ class Emitter : public gcode::GcodePrinter {
       guard_line("ABS[" + offset_of(k + 1) + value + "]", 1, "G54 IS NOT THE PLACE OF THE PART");
     }
     guard_zero(4);
-    std::string value = guard_number(-program().tool_length);
-    if (value.front() != '-') value.insert(0, 1, '+');
-    guard_line("ABS[#" + std::to_string(11000 + first_offset_) + "+#" +
-                   std::to_string(10000 + first_offset_) + value + "]",
-               2, "H" + std::to_string(first_offset_) + " IS NOT THE LENGTH OF THE TOOL");
+    for (const gcode::ProgramTool& tool : tools_) {
+      std::string value = guard_number(-tool.length);
+      if (value.front() != '-') value.insert(0, 1, '+');
+      guard_line("ABS[#" + std::to_string(11000 + tool.number) + "+#" +
+                     std::to_string(10000 + tool.number) + value + "]",
+                 2, "H" + std::to_string(tool.number) + " IS NOT THE LENGTH OF THE TOOL");
+    }
   }
 
   // ---- actions
@@ -180,33 +183,9 @@ class Emitter : public gcode::GcodePrinter {
     if (change && mode_ == Mode::tool) block("G49");
     block(text);
     if (!change) return;
-    offset_ = offset_of_tool(action).value_or(offset_);
+    offset_ = gcode::tool_number(action, kMostTools).value_or(offset_);
     mode_ = Mode::unknown;
     words().forget();
-  }
-
-  // H has the number of the tool.
-  static std::optional<int> offset_of_tool(const MachineAction& action) {
-    constexpr double kMost = 400.0;
-    for (const auto& [name, value] : action.event.parameters) {
-      const auto number = whole_number(value);
-      if (name == "tool" && number && *number >= 1.0 && *number <= kMost &&
-          *number == std::floor(*number))
-        return static_cast<int>(*number);
-    }
-    return std::nullopt;
-  }
-
-  int offset_of_first_tool_move() const {
-    int offset = 1;
-    std::size_t first = 0;
-    while (first < program().moves.size() && !is_tool(move(first))) ++first;
-    for (const auto& action : program().actions) {
-      if (action.before > first) break;
-      if (action.kind == MachineAction::Kind::event && action.event.name == event_name::kToolChange)
-        offset = offset_of_tool(action).value_or(offset);
-    }
-    return offset;
   }
 
   // ---- moves
@@ -272,8 +251,8 @@ class Emitter : public gcode::GcodePrinter {
   gcode::ToolWords tool_words_;
   Vec3 shift_ = Vec3::Zero();  // of G54
   JointMask tip_joints_ = 0;
-  int first_offset_ = 1;
-  int offset_ = 1;  // H
+  std::vector<gcode::ProgramTool> tools_;
+  int offset_ = 1;  // H has the number of the tool
   Mode mode_ = Mode::unknown;
   bool inverse_time_ = false;
 };

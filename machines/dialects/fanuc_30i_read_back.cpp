@@ -39,18 +39,23 @@ class Guard {
     return take_place(value) || take_length(value);
   }
 
-  bool empty() const { return zero_.empty() && !tool_length_ && place_.empty(); }
+  bool empty() const { return zero_.empty() && lengths_.empty() && place_.empty(); }
 
   bool complete(int axes, bool poses) const {
     std::set<int> wanted;
     for (int n = poses ? 4 : 1; n <= axes; ++n) wanted.insert(n);
-    return zero_ == wanted && tool_length_.has_value() == poses && place_.size() == (poses ? 3 : 0);
+    return zero_ == wanted && lengths_.empty() != poses && place_.size() == (poses ? 3 : 0);
   }
   std::optional<Vec3> place() const {
     if (place_.size() != 3) return std::nullopt;
     return Vec3(place_.at(1), place_.at(2), place_.at(3));
   }
-  std::optional<double> tool_length() const { return tool_length_; }
+  /// That of offset H.
+  std::optional<double> tool_length(int offset) const {
+    const auto found = lengths_.find(offset);
+    return found == lengths_.end() ? std::nullopt : std::optional(found->second);
+  }
+  /// The offset of the first length; 0: there is none.
   int tool() const { return tool_; }
 
  private:
@@ -95,17 +100,16 @@ class Guard {
       if (!drop(rest, "#" + std::to_string(11000 + h) + "+#" + std::to_string(10000 + h))) continue;
       if (rest.empty() || (rest[0] != '+' && rest[0] != '-')) continue;
       const auto value = whole_number(rest);
-      if (!value || tool_length_) return false;
-      tool_length_ = -*value;
-      tool_ = h;
+      if (!value || !lengths_.emplace(h, -*value).second) return false;
+      if (tool_ == 0) tool_ = h;
       return true;
     }
     return false;
   }
 
-  std::set<int> zero_;           // control axes whose offset has to be 0
-  std::map<int, double> place_;  // of X Y Z
-  std::optional<double> tool_length_;
+  std::set<int> zero_;             // control axes whose offset has to be 0
+  std::map<int, double> place_;    // of X Y Z
+  std::map<int, double> lengths_;  // by offset
   int tool_ = 0;
 };
 
@@ -191,8 +195,10 @@ class Reading : public gcode::GcodeReading {
             "stands is not known, nor how fast the first motion is. Name them in G53 G0 before");
     centre_ = block.has('G', 43.4) ? Centre::positions : Centre::vectors;
     tool_.begin(centre_ == Centre::vectors);
-    // Where the tip stands is known for one tool.
-    if (static_cast<int>(h->value) != guard_.tool()) tool_.stand(joints(), std::nullopt);
+    const auto length = guard_.tool_length(static_cast<int>(h->value));
+    if (!guard_.empty() && !length)
+      error(block.at, "the guard says nothing of the length in H" + decimal_word(h->value));
+    tool_.stand(joints(), length ? tip(*length) : std::nullopt);
     return true;
   }
 
@@ -271,18 +277,18 @@ class Reading : public gcode::GcodeReading {
       const JointBend none;
       move.duration *= std::abs(arc_shape({start.joints, move.to, none, move.arc}).sweep);
     }
-    find_tip();
     return true;
   }
 
-  // Where the tip is, for the time of the first move behind; nothing when the text does not say.
-  void find_tip() {
+  // Where the tip is with a tool of that length, for the time of the first move behind; nothing
+  // when the text does not say.
+  std::optional<Vec3> tip(double length) const {
     const auto place = guard_.place();
-    if (!all_known() || !place || !guard_.tool_length()) return tool_.stand(joints(), std::nullopt);
-    ScrewChain chain = chain_of(machine(), *guard_.tool_length() * scale_);
+    if (!all_known() || !place) return std::nullopt;
+    ScrewChain chain = chain_of(machine(), length * scale_);
     chain.workpiece_home = Pose::Identity();
     chain.workpiece_home.translation() = *place * scale_;
-    tool_.stand(joints(), forward_location(chain, joints()).tip);
+    return forward_location(chain, joints()).tip;
   }
 
   bool read_pose(const Block& block, const Word* f, ReadBackMove& move) {

@@ -19,6 +19,7 @@ constexpr std::string_view kName = "SMOOTHPOST";
 constexpr int kMostDigits = 4;  // of a coordinate
 constexpr int kVectorDigits = 8;
 constexpr int kGuardDigits = 5;
+constexpr int kMostTools = 32767;
 constexpr int kFeedDigits = 3;
 constexpr double kLargestFeed = 99999.999;
 constexpr double kTenthsOfInch = 10.0;  // F of a program in inch is in 0.1 inch/min
@@ -30,7 +31,8 @@ class Emitter : public ProgramPrinter {
         vectors_(machine.dialect.name == kVectorDialect.name),
         words_(machine, {false, true}),
         tool_words_(machine, program, words_),
-        feed_unit_(machine.dialect.units == "inch" ? kTenthsOfInch : 1.0) {}
+        feed_unit_(machine.dialect.units == "inch" ? kTenthsOfInch : 1.0),
+        tools_(gcode::tools_of(program, kMostTools)) {}
 
  private:
   enum class Mode { unknown, joints, tool };
@@ -70,9 +72,12 @@ class Emitter : public ProgramPrinter {
     if (!program().certified)
       comment("NOT CERTIFIED. Written with --force: read the report before you run it");
     for (const auto& title : program().title) comment(title);
-    if (has_poses())
-      comment("The preset has to be the place of the part, the tool " +
-              decimal_text(program().tool_length * words_.length_scale(), kGuardDigits) + " long");
+    for (const gcode::ProgramTool& tool : tools_) {
+      const std::string length = decimal_text(tool.length * words_.length_scale(), kGuardDigits);
+      comment(&tool == tools_.data()
+                  ? "The preset has to be the place of the part, the tool " + length + " long"
+                  : "Tool " + std::to_string(tool.number) + " has to be " + length + " long");
+    }
     for (const auto& own : machine().dialect.start) block(own);
     modal_words();
     if (has_poses() && machine().dialect.offset_guard) guard();
@@ -127,8 +132,8 @@ class Emitter : public ProgramPrinter {
   }
 
   // Position in the REF system minus that in the active one is what lies between them: the preset,
-  // along Z the length of whichever tool is active, too. System data are in mm. The plan's tool is
-  // looked up by its number: its TOOL CALL comes later.
+  // along Z the length of whichever tool is active, too. System data are in mm. The plan's tools
+  // are looked up by their numbers: their TOOL CALLs come later.
   void guard() {
     int index = 0;
     for (const char letter : kAxisLetters) {
@@ -146,9 +151,11 @@ class Emitter : public ProgramPrinter {
             " )");
       block("FN 11: IF +Q52 GT +0.0005 GOTO LBL 91");
     }
-    block("FN 18: SYSREAD Q50 = ID200 NR6 IDX" + std::to_string(first_tool()));
-    block("Q52 = ABS ( Q50" + minus(program().tool_length) + " )");
-    block("FN 11: IF +Q52 GT +0.0005 GOTO LBL 91");
+    for (const gcode::ProgramTool& tool : tools_) {
+      block("FN 18: SYSREAD Q50 = ID200 NR6 IDX" + std::to_string(tool.number));
+      block("Q52 = ABS ( Q50" + minus(tool.length) + " )");
+      block("FN 11: IF +Q52 GT +0.0005 GOTO LBL 91");
+    }
     block("FN 18: SYSREAD Q53 = ID210 NR6");
     block("FN 10: IF +Q53 NE +0 GOTO LBL 91");
     block("FN 9: IF +0 EQU +0 GOTO LBL 92");
@@ -157,23 +164,6 @@ class Emitter : public ProgramPrinter {
     block("STOP");
     block("FN 9: IF +0 EQU +0 GOTO LBL 91");
     block("LBL 92");
-  }
-
-  // The number of the tool that the first tool move has; 1 when no event says one.
-  int first_tool() const {
-    constexpr double kMost = 32767.0;
-    int tool = 1;
-    std::size_t first = 0;
-    while (first < program().moves.size() && !is_tool(move(first))) ++first;
-    for (const auto& action : program().actions) {
-      if (action.before > first || action.event.name != event_name::kToolChange) continue;
-      for (const auto& [name, value] : action.event.parameters) {
-        const auto number = whole_number(value);
-        const bool good = name == "tool" && number && *number >= 1.0 && *number <= kMost;
-        if (good && *number == std::floor(*number)) tool = static_cast<int>(*number);
-      }
-    }
-    return tool;
   }
 
   // ---- moves
@@ -237,6 +227,7 @@ class Emitter : public ProgramPrinter {
   gcode::AxisWords words_;
   gcode::ToolWords tool_words_;
   double feed_unit_ = 1.0;
+  std::vector<gcode::ProgramTool> tools_;
   Mode mode_ = Mode::unknown;
   JointVector last_;
 };

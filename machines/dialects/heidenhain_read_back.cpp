@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "kernels/core/units.h"
@@ -28,6 +29,7 @@ class Guard {
       const auto number = whole_number(std::string_view(text).substr(kTool.size()));
       if (!number || *number < 1.0) return false;
       axis_ = 0;
+      number_ = *number;
       step_ = Step::sum;
       return true;
     }
@@ -48,8 +50,8 @@ class Guard {
     }
     if (step_ == Step::jump && text == "FN11:IF+Q52GT+0.0005GOTOLBL91") {
       step_ = Step::first;
-      const char key = axis_ == 0 ? kLength : kSystemAxes[static_cast<std::size_t>(axis_ - 1)];
-      return offsets_.emplace(key, value_).second;
+      if (axis_ == 0) return lengths_.emplace(number_, value_).second;
+      return offsets_.emplace(kSystemAxes[static_cast<std::size_t>(axis_ - 1)], value_).second;
     }
     static const std::array<const char*, 7> kEnd = {"FN18:SYSREADQ53=ID210NR6",
                                                     "FN10:IF+Q53NE+0GOTOLBL91",
@@ -67,21 +69,25 @@ class Guard {
 
   bool started() const { return step_ != Step::first || !offsets_.empty(); }
   bool complete(const MachineDefinition& machine) const {
-    std::set<char> wanted = {kLength}, found;
+    std::set<char> wanted, found;
     for (const auto& axis : machine.axes) wanted.insert(axis.letter);
     for (const auto& [letter, value] : offsets_) {
       found.insert(letter);
-      const bool rotary_or_extra = letter != kLength && (letter < 'X' || letter > 'Z');
+      const bool rotary_or_extra = letter < 'X' || letter > 'Z';
       if (rotary_or_extra && value != 0.0) return false;
     }
-    return complete_ && wanted == found;
+    return complete_ && wanted == found && !lengths_.empty();
   }
   /// The place of the part.
   Vec3 offset() const { return {value('X'), value('Y'), value('Z')}; }
-  double tool_length() const { return value(kLength); }
+  /// That of the tool with this number, mm; 0 stands for the only one.
+  std::optional<double> tool_length(double number) const {
+    if (number == 0.0 && lengths_.size() == 1) return lengths_.begin()->second;
+    const auto found = lengths_.find(number);
+    return found == lengths_.end() ? std::nullopt : std::optional(found->second);
+  }
 
  private:
-  static constexpr char kLength = 'L';
   enum class Step { first, second, length, sum, jump };
 
   double value(char letter) const {
@@ -112,9 +118,11 @@ class Guard {
   }
 
   Step step_ = Step::first;
-  int axis_ = 0;
+  int axis_ = 0;         // 0: the length of a tool
+  double number_ = 0.0;  // of that tool
   double value_ = 0.0;
   std::map<char, double> offsets_;
+  std::map<double, double> lengths_;  // by number
   std::size_t end_ = 0;
   bool complete_ = false;
 };
@@ -155,6 +163,7 @@ class Reading : public ProgramReading {
       return read_motion(block);
     }
     const std::string text = packed_statement(block.text);
+    note_tool_call(text);
     if (text == "FUNCTIONRESETTCPM") {
       centre_ = false;
       reset_ = true;
@@ -165,6 +174,7 @@ class Reading : public ProgramReading {
               "nor how fast the first motion is. Name them with M91 before");
       centre_ = true;
       began_ = true;
+      begin_at_tip(block);
     } else if (text == "M127") {
       written_way_ = true;
     } else if (text == "CYCLDEF9.0DWELLTIME") {
@@ -225,14 +235,31 @@ class Reading : public ProgramReading {
       move.duration = std::sqrt(linear > 0.0 ? linear : rotary) / feed_per_second(*f);
     move.to = joints();
     move.known = known();
-    stand();
     return true;
   }
 
-  // Where the tip is, for the time of the first tool move behind.
-  void stand() {
+  // TOOL CALL 5 Z S2000. With a name or a parameter in the place of the number the tool is none
+  // that the guard has, with neither (TOOL CALL S2000) it stays.
+  void note_tool_call(std::string_view text) {
+    constexpr std::string_view kCall = "TOOLCALL";
+    if (text.substr(0, kCall.size()) != kCall) return;
+    text.remove_prefix(kCall.size());
+    const auto end = std::min(text.find_first_not_of("0123456789"), text.size());
+    if (end > 0)
+      spindle_tool_ = whole_number(text.substr(0, end)).value_or(-1.0);
+    else if (!text.empty() && (text[0] == '"' || text[0] == 'Q'))
+      spindle_tool_ = -1.0;
+  }
+
+  // Where the tip is, for the time of the first tool move.
+  void begin_at_tip(const Block& block) {
     if (!all_known() || !guard_.complete(machine())) return tool_.stand(joints(), std::nullopt);
-    ScrewChain chain = chain_of(machine(), guard_.tool_length());
+    const auto length = guard_.tool_length(spindle_tool_);
+    if (!length)
+      return error(block.at,
+                   "the guard says nothing of the length of the tool in the spindle: TOOL CALL "
+                   "names a tool by its number, and the guard has its length");
+    ScrewChain chain = chain_of(machine(), *length);
     chain.workpiece_home = Pose::Identity();
     chain.workpiece_home.translation() = guard_.offset();
     tool_.stand(joints(), forward_location(chain, joints()).tip);
@@ -288,6 +315,7 @@ class Reading : public ProgramReading {
   bool began_ = false;
   bool by_vector_ = false;
   bool only_machine_words_ = true;
+  double spindle_tool_ = 0.0;  // of the last TOOL CALL; 0: there was none
   std::uint32_t dwell_line_ = 0;
 };
 

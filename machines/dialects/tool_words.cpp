@@ -35,6 +35,34 @@ bool is_turned(const MachineProgram& program) {
   });
 }
 
+std::optional<int> tool_number(const MachineAction& action, int most) {
+  if (action.kind != MachineAction::Kind::event || action.event.name != event_name::kToolChange)
+    return std::nullopt;
+  for (const auto& [name, value] : action.event.parameters) {
+    const auto number = whole_number(value);
+    if (name == "tool" && number && *number >= 1.0 && *number <= most &&
+        *number == std::floor(*number))
+      return static_cast<int>(*number);
+  }
+  return std::nullopt;
+}
+
+std::vector<ProgramTool> tools_of(const MachineProgram& program, int most) {
+  std::vector<ProgramTool> tools;
+  int number = 1;
+  auto action = program.actions.begin();
+  for (std::size_t i = 0; i < program.moves.size(); ++i) {
+    for (; action != program.actions.end() && action->before <= i; ++action)
+      number = tool_number(*action, most).value_or(number);
+    if (program.moves[i].interpolation != MoveInterpolation::tool) continue;
+    const bool known = std::any_of(tools.begin(), tools.end(), [number](const ProgramTool& tool) {
+      return tool.number == number;
+    });
+    if (!known) tools.push_back({number, program.moves[i].tool_length});
+  }
+  return tools;
+}
+
 ToolWords::ToolWords(const MachineDefinition& machine, const MachineProgram& program,
                      AxisWords& words)
     : machine_(machine), words_(words), chain_(chain_of(machine)) {

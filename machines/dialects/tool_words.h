@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "kernels/kinematics/inverse.h"
 #include "machines/dialects/dialect.h"
@@ -18,6 +19,19 @@ MachineProgram along_machine_axes(const MachineProgram& program);
 
 /// Whether along_machine_axes() would change a pose.
 bool is_turned(const MachineProgram& program);
+
+/// A tool that tool moves are made with.
+struct ProgramTool {
+  int number = 1;
+  double length = 0.0;  ///< mm
+};
+
+/// The number that a tool change names, from 1 to `most`; nothing: it is none, or names no such.
+std::optional<int> tool_number(const MachineAction& action, int most);
+
+/// The tools of a program's tool moves in the order of their first ones. A number is that of the
+/// last tool_number() before, or 1.   Cost: linear in the moves, times the tools.
+std::vector<ProgramTool> tools_of(const MachineProgram& program, int most);
 
 /// Prints the words of tool moves: X Y Z of the tip in W, with the positions of the rotary axes or
 /// the vector of the tool axis; only what changed, at least one. Follows the program move by move.

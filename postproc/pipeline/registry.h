@@ -3,11 +3,11 @@
 #include <span>
 #include <string_view>
 
-#include "machines/dialects/dialect.h"
+#include "machines/dialects/dialect_table.h"
 #include "postproc/pipeline/interpret.h"
 
-// The explicit tables of what this version reads and writes, sorted by name. A new format or
-// dialect is one row.
+// The explicit table of what this version reads, sorted by name; that of what it writes stands in
+// machines/dialects. A new format is one row.
 namespace smoothpost {
 
 struct InputFormat {
@@ -19,11 +19,9 @@ struct InputFormat {
 };
 
 std::span<const InputFormat> input_formats();
-std::span<const Dialect> dialects();
 
 /// Row of that name, or nullptr.
 const InputFormat* find_input_format(std::string_view name);
-const Dialect* find_dialect(std::string_view name);
 
 /// The format that a file name's extension stands for, or nullptr.
 const InputFormat* format_by_extension(std::string_view file_name);

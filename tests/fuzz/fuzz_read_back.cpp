@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "machines/definition/machine_file.h"
-#include "postproc/pipeline/registry.h"
+#include "machines/dialects/dialect_table.h"
 #include "tests/fuzz/expect.h"
 
 namespace {

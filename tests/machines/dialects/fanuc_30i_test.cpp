@@ -121,6 +121,7 @@ TEST_CASE("fanuc_30i: events and tool changes", "[machines][dialects]") {
   auto program = short_tool_program(machine);
   program.moves.push_back(program.moves[0]);
   program.moves.push_back(program.moves[1]);
+  for (std::size_t i = 4; i < program.moves.size(); ++i) program.moves[i].tool_length = 80.0;
   using Kind = MachineAction::Kind;
   program.actions = {event("tool_change", 1, {{"tool", "7"}}),
                      event("beam_on", 2, {{"percent", "40"}}),
@@ -135,6 +136,9 @@ TEST_CASE("fanuc_30i: events and tool changes", "[machines][dialects]") {
   CHECK(text.find("(H7 HAS TO HOLD TOOL LENGTH 50, G54 THE PLACE OF THE PART)") !=
         std::string::npos);
   CHECK(text.find("IF [ABS[#11007+#10007-50] GT 0.0005] THEN #3000=2(H7 IS") != std::string::npos);
+  // The second tool is 30 mm longer.
+  CHECK(text.find("(H12 HAS TO HOLD TOOL LENGTH 80)") != std::string::npos);
+  CHECK(text.find("IF [ABS[#11012+#10012-80] GT 0.0005] THEN #3000=2(H12 IS") != std::string::npos);
   CHECK(text.find("G43.4 H7 P1") < text.find("G43.4 H12 P1"));
   CHECK(text.find("(CUT 2 FROM INPUT LINE 9)") != std::string::npos);
   const auto back = read_back(fanuc_30i::kDialect, machine, text);
@@ -148,6 +152,36 @@ TEST_CASE("fanuc_30i: events and tool changes", "[machines][dialects]") {
   }
   CHECK(back.moves[2].beam);
   CHECK_FALSE(back.moves[4].beam);
+}
+
+TEST_CASE("fanuc_30i: the first tool move of every tool has its time", "[machines][dialects]") {
+  for (const Dialect* dialect : {&fanuc_30i::kDialect, &fanuc_30i::kVectorDialect}) {
+    auto machine = machine_of("table_table_bc", *dialect);
+    machine.process.events = {{"tool_change", "T{tool} M6", false, 0.0, 0.0}};
+    auto program = short_tool_program(machine);
+    for (const std::size_t i : {0, 1, 2}) program.moves.push_back(program.moves[i]);
+    for (std::size_t i = 4; i < program.moves.size(); ++i) program.moves[i].tool_length = 80.0;
+    program.actions = {event("tool_change", 0, {{"tool", "7"}}),
+                       event("tool_change", 4, {{"tool", "12"}})};
+    const auto text = emitted(*dialect, machine, program).text;
+    const auto back = read_back(*dialect, machine, text);
+    for (const std::size_t i : {1, 2, 3, 5, 6}) {
+      CAPTURE(i, text);
+      CHECK(back.moves[i].duration == Approx(0.5).epsilon(1e-3));
+    }
+    // A guard that does not name the second tool, or another one.
+    const auto line = text.find("IF [ABS[#11012");
+    REQUIRE(line != std::string::npos);
+    const auto begin = text.rfind('\n', line) + 1, end = text.find('\n', line) + 1;
+    std::string without = text, other = text;
+    without.erase(begin, end - begin);
+    other.replace(text.find("#11012+#10012"), 13, "#11013+#10013");
+    for (const std::string& changed : {without, other}) {
+      const auto read = dialect->read_back(machine, changed, "out");
+      REQUIRE_FALSE(read.ok());
+      CHECK(read.diagnostics()[0].text.find("H12") != std::string::npos);
+    }
+  }
 }
 
 TEST_CASE("fanuc_30i: a turned part is written along the machine's axes", "[machines][dialects]") {
@@ -192,7 +226,7 @@ TEST_CASE("fanuc_30i: what could move differently than certified is refused",
       {" P1\n", "\n"},
       {" G43.4 H1", " G43 H1"},
       {" G43.4 H1", " G43.4 H2"},  // the length of another tool
-      {" G61\n", " G64\n"},  // blends
+      {" G61\n", " G64\n"},        // blends
       {" G90 ", " G91 "},
       {"G21 ", ""},
       {" F240.", ""},  // no feed

@@ -126,6 +126,37 @@ TEST_CASE("heidenhain: events and the beam", "[machines][dialects]") {
   CHECK_FALSE(back.moves[4].beam);
 }
 
+TEST_CASE("heidenhain: the first tool move of every tool has its time", "[machines][dialects]") {
+  for (const Dialect* dialect : {&heidenhain::kDialect, &heidenhain::kVectorDialect}) {
+    auto machine = machine_of("table_table_bc", *dialect);
+    machine.process.events = {{"tool_change", "TOOL CALL {tool} Z", false, 0.0, 0.0},
+                              {"spindle_on", "TOOL CALL S{rpm}", false, 0.0, 0.0}};
+    auto program = short_tool_program(machine);
+    for (const std::size_t i : {0, 1, 2}) program.moves.push_back(program.moves[i]);
+    for (std::size_t i = 4; i < program.moves.size(); ++i) program.moves[i].tool_length = 80.0;
+    program.actions = {event("tool_change", 0, {{"tool", "7"}}),
+                       event("tool_change", 4, {{"tool", "12"}}),
+                       event("spindle_on", 4, {{"rpm", "800"}})};
+    const auto text = emitted(*dialect, machine, program).text;
+    CHECK(text.find("; Tool 12 has to be 80 long") != std::string::npos);
+    const auto back = read_back(*dialect, machine, text);
+    for (const std::size_t i : {1, 2, 3, 5, 6}) {
+      CAPTURE(i, text);
+      CHECK(back.moves[i].duration == Approx(0.5).epsilon(1e-3));
+    }
+    // A guard that has another tool; a tool in the spindle that it does not have.
+    for (const auto& [from, to] :
+         {std::pair("NR6 IDX12", "NR6 IDX13"), std::pair("TOOL CALL 12 Z", "TOOL CALL 13 Z")}) {
+      std::string changed = text;
+      changed.replace(changed.find(from), std::string(from).size(), to);
+      const auto read = dialect->read_back(machine, changed, "out");
+      REQUIRE_FALSE(read.ok());
+      CHECK(read.diagnostics()[0].text.find("length of the tool in the spindle") !=
+            std::string::npos);
+    }
+  }
+}
+
 TEST_CASE("heidenhain: a turned part is written along the machine's axes", "[machines][dialects]") {
   std::mt19937 rng(32);
   for (const char* name : {"table_table_bc", "head_head_ca", "head_table_bc"})
