@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kToBoundary = 0.99;
 constexpr double kStartSlack = 0.02;  // of rows that the start breaks
-constexpr double kStartGap = 1.0;     // of T, at least: less hugs the rows far from the optimum
+constexpr double kStartGap = 0.3;     // of T, at least: less hugs the rows far from the optimum
 
 /// The iteration on one grid.
 class FeedIteration {
