@@ -50,11 +50,11 @@ struct FeedMending {
   FeedSolverSettings solver;
 };
 
-/// Solves the elements that want more than `most` again, with 12 on each side of them, in place:
+/// Solves the elements that want more than `most` again, with 24 on each side of them, in place:
 /// everything else stays. Three controls beside each such run hold b, b' and b''; rows of the four
 /// elements next to them are let out by 0.04 %, for the law that is held there uses them up. Where
 /// that has no law (in the middle of a way at full acceleration the speed at the end of a slower
-/// start cannot be had), 48, 192 .. elements on each side, at last all of them; where they have
+/// start cannot be had), 96, 384 .. elements on each side, at last all of them; where they have
 /// none, the law stays. Returns the elements whose law may have changed. `solution.time` and
 /// iterations are brought up to date.   Deterministic on any number of threads (TBB).   Cost:
 /// solve_feed()'s of the runs.

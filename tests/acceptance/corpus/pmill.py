@@ -4,8 +4,8 @@
   pmill.py --smoothpost TOOL --shared FOLDER [--points N] [--work FOLDER]
 
 The corpus's pmill_test1_4.as: 3,716 tool axes of an NCL export, 2,244 of them below the horizon. The part is turned by
---work-offset so that every axis is at most 87.85 degrees from the vertical, and stands high enough for the nose; the robot takes
-it as it is. N: only the first so many places (default: all). Status 77: no corpus.
+--work-offset so that every axis is at most 87.85 degrees from the vertical, and stands high enough for the nose; for the robot it
+keeps its own axes and stands where `smoothpost place` has found room for it. N: only the first so many places (default: all). Status 77: no corpus.
 """
 
 import argparse
@@ -22,7 +22,7 @@ TURN = "-87.810872771,-10.508722643,0"  # the axis of the smallest cone about al
 CASES = {
     "table_table_ac": ["--tool", "1=150", "--work-offset", f"G54=0,0,150,{TURN}"],
     "table_table_bc": ["--tool", "1=150", "--work-offset", f"G54=0,0,150,{TURN}"],
-    "robot_6r": ["--tool", "1=60", "--work-offset", "auto"],
+    "robot_6r": ["--tool", "1=60", "--work-offset", "G54=-3223.9,-964.4,226.4,0,0,134.9"],  # found by `smoothpost place`
 }
 
 

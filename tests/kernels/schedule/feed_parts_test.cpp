@@ -117,7 +117,7 @@ TEST_CASE("feed_parts: feeds that differ by powers of ten do not join parts",
 
 TEST_CASE("mend_law: rows that are drawn in are kept, what is far from them stays",
           "[kernels][schedule]") {
-  constexpr std::size_t kFirst = 700, kCount = 10, kReach = 12;
+  constexpr std::size_t kFirst = 700, kCount = 10, kReach = 24;
   for (unsigned seed : {5u, 6u, 7u}) {
     Problem p(seed, 3000.0, 2000);
     const FeedSolution before = solve_in_parts(p.program, {{1e-6}}).solution;
