@@ -101,14 +101,18 @@ Diagnostic problem(const char* code, std::string text, SourceLocation where) {
   return {Severity::error, code, std::move(text), std::move(where)};
 }
 
-/// Follows strings and comments through TOML text and measures nesting and dotted keys, so that the
-/// recursion of everything that comes after is bounded.
-class DepthScan {
+/// Follows strings and comments through TOML text up to what the parser must not see: too deep
+/// nesting or too many parts of a dotted key, for the recursion of everything that comes after, and
+/// characters that are not ASCII outside of strings and comments, which TOML does not have, and for
+/// some of which (U+00A1 to U+0499 in the place of a value) toml++ 3.3 has undefined behaviour.
+class Scan {
  public:
-  explicit DepthScan(std::string_view text) : text_(text) {}
+  explicit Scan(std::string_view text) : text_(text) {
+    if (text.starts_with("\xEF\xBB\xBF")) at_ = 3;
+  }
 
-  /// Position of the first character that is too deep, or npos.
-  std::size_t run() {
+  enum class Found { nothing, depth, foreign };
+  Found run() {
     while (at_ < text_.size()) {
       const char c = text_[at_];
       if (c == '#') {
@@ -116,12 +120,16 @@ class DepthScan {
       } else if (c == '"' || c == '\'') {
         skip_string(c);
       } else {
-        if (!count(c)) return at_;
+        if (static_cast<unsigned char>(c) >= 0x80U) return Found::foreign;
+        if (!count(c)) return Found::depth;
         ++at_;
       }
     }
-    return std::string_view::npos;
+    return Found::nothing;
   }
+
+  /// Where it was found.
+  std::size_t at() const { return at_; }
 
  private:
   bool count(char c) {
@@ -146,6 +154,9 @@ class DepthScan {
         at_ += 2;
       } else if (multi_line ? text_.substr(at_, 3) == three : text_[at_] == quote) {
         at_ += multi_line ? 3 : 1;
+        // Of up to five quotes at the end of a multi-line string the first two belong to it.
+        for (int k = 0; multi_line && k < 2 && text_.substr(at_, 1) == three.substr(0, 1); ++k)
+          ++at_;
         return;
       } else if (!multi_line && text_[at_] == '\n') {
         return;  // the parser says what is wrong with it
@@ -238,13 +249,20 @@ Result<TomlTable> parse_toml(std::string_view text, const std::string& file) {
                 "the file has " + std::to_string(text.size()) + " bytes, more than the " +
                     std::to_string(kMaxTomlBytes) + " that are read: is it a machine file?",
                 {file, 0, 0}));
-  const std::size_t deep = DepthScan(text).run();
-  if (deep != std::string_view::npos)
+  Scan scan(text);
+  const Scan::Found found = scan.run();
+  if (found == Scan::Found::depth)
     return Result<TomlTable>::failure(problem(
         "MF102",
         "nested more than " + std::to_string(kMaxTomlNesting) +
             " deep, or a dotted key of more than " + std::to_string(kMaxTomlKeyParts) + " parts",
-        location_of(text, deep, file)));
+        location_of(text, scan.at(), file)));
+  if (found == Scan::Found::foreign)
+    return Result<TomlTable>::failure(
+        problem("MF101",
+                "not TOML: a character that is not ASCII stands outside of quotes; texts, and "
+                "names with such characters, stand in quotes",
+                location_of(text, scan.at(), file)));
   const toml::parse_result parsed = toml::parse(text, std::string_view(file));
   const TreeBuilder builder(text, file);
   if (!parsed) {

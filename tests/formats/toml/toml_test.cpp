@@ -1,5 +1,6 @@
 #include "formats/toml/toml.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <random>
@@ -149,6 +150,40 @@ TEST_CASE("toml: broken text is an error at its place", "[formats][toml]") {
   }
   CHECK(failure(std::string("a = 1\n\0b = 2\n", 13)).code == "MF101");
   CHECK(failure("a = \"\xC3\x28\"\n").code == "MF101");
+}
+
+TEST_CASE("toml: characters that are not ASCII stand in quotes and comments only",
+          "[formats][toml]") {
+  std::size_t tried = 0;
+  // Every place of a character outside of a string: as and in a value, a key, a table's name.
+  for (char32_t c = 0xA0; c < 0xFFFE; c += c < 0x700 ? 1 : 97) {
+    if (c >= 0xD800 && c < 0xE000) continue;
+    std::string utf8;
+    if (c >= 0x800) utf8 += static_cast<char>(0xE0 | (c >> 12));
+    utf8 += static_cast<char>(c >= 0x800 ? 0x80 | ((c >> 6) & 0x3F) : 0xC0 | (c >> 6));
+    utf8 += static_cast<char>(0x80 | (c & 0x3F));
+    for (const std::string& bad :
+         {"a = " + utf8, "a = [0, " + utf8 + "]", utf8 + " = 1", "a" + utf8 + " = 1",
+          "[" + utf8 + "]", "a = 1 " + utf8, "a = \"\"\"x\"\"\"\"\"\n" + utf8 + " = 1"}) {
+      const auto result = parse_toml("k = 1\n" + bad + "\n", "t.toml");
+      REQUIRE_FALSE(result.ok());
+      const Diagnostic& d = result.diagnostics()[0];
+      const std::string before = "k = 1\n" + bad.substr(0, bad.find(utf8));
+      REQUIRE(d.code == "MF101");
+      REQUIRE(d.where.line == 1 + std::count(before.begin(), before.end(), '\n'));
+      REQUIRE(d.where.column == static_cast<int>(before.size() - before.rfind('\n')));
+      ++tried;
+    }
+    for (const std::string& good :
+         {"a = \"" + utf8 + "\"", "a = '" + utf8 + "'", "\"" + utf8 + "\" = 1", "a = 1 # " + utf8,
+          "a = \"\"\"\n" + utf8 + "\"\"\"\"\nb = '''" + utf8 + "'''"}) {
+      INFO(good);
+      const auto r = parse_toml(good + "\n", "t.toml");
+      INFO((r.ok() ? "" : to_string(r.diagnostics()[0])));
+      REQUIRE(r.ok());
+    }
+  }
+  CHECK(tried > 10'000);
 }
 
 TEST_CASE("toml: deep and huge text is refused, not followed", "[formats][toml]") {
