@@ -34,6 +34,11 @@ class Reader {
       diagnostics_.push_back({Severity::error, code, std::move(text), {file_, line, 0}});
   }
 
+  static int line_of(std::string_view text, std::size_t at) {
+    const auto end = static_cast<std::ptrdiff_t>(std::min(at, text.size()));
+    return 1 + static_cast<int>(std::count(text.begin(), text.begin() + end, '\n'));
+  }
+
   void parse(std::string_view text, Machine& machine) {
     bool deep = false;
     const json::parser_callback_t limit = [&deep](int depth, json::parse_event_t, json&) {
@@ -44,10 +49,16 @@ class Reader {
     try {
       tree = json::parse(text.begin(), text.end(), limit);
     } catch (const json::parse_error& e) {
-      const std::size_t at = std::min(e.byte, text.size());
-      return error("MF201", "not JSON",
-                   1 + static_cast<int>(std::count(
-                           text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n')));
+      return error("MF201", "not JSON", line_of(text, e.byte));
+    } catch (const json::out_of_range& e) {
+      // "... number overflow parsing '8E333'": what it stands for has no other name.
+      const std::string_view what = e.what();
+      const std::size_t begin = std::min(what.find('\''), what.size() - 1) + 1;
+      const std::string_view number = what.substr(begin, what.rfind('\'') - begin);
+      return error("MF201",
+                   "the number " + std::string(number.substr(0, 30)) +
+                       " is too large; at most 1.7e308 is read",
+                   line_of(text, text.find(number)));
     }
     if (deep) return error("MF201", "the file nests deeper than 64");
     const json* root = object(tree, "machine");

@@ -61,3 +61,18 @@ TEST_CASE("read_fcm: faults are named by their path", "[formats][freecad]") {
   CHECK(first(kMill, "[1, 0, 0]}", "[0, 0, 0]}").code == "MF203");
   CHECK(first(kMill, "18000", "-1").code == "MF203");
 }
+
+TEST_CASE("read_fcm: a number that no double holds is an error at its line", "[formats][freecad]") {
+  for (const char* number : {"8E333", "-1e999", "1E400"}) {
+    std::string text = kMill;
+    text.replace(text.find("18000"), 5, number);
+    for (const auto& [given, line] : {std::pair(text, 4), std::pair(std::string("\n") + number, 2),
+                                      std::pair(std::string(number), 1)}) {
+      const auto read = freecad::read_fcm(given, "m.fcm");
+      REQUIRE_FALSE(read.ok());
+      CHECK(read.diagnostics()[0].code == "MF201");
+      CHECK(read.diagnostics()[0].where.line == line);
+      CHECK(read.diagnostics()[0].text.find("is too large") != std::string::npos);
+    }
+  }
+}
